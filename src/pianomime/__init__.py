@@ -1,0 +1,1 @@
+"""PianoMime: give it a song, and two simulated robot hands play it."""

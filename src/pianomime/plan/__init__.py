@@ -1,0 +1,6 @@
+"""Planners: from a Score to a FingertipPlan."""
+
+from pianomime.plan.fingertip_plan import FINGERS, LEFT, NO_KEY, POINTS, RIGHT, FingertipPlan
+from pianomime.plan.planner import Planner
+
+__all__ = ["FINGERS", "LEFT", "NO_KEY", "POINTS", "RIGHT", "FingertipPlan", "Planner"]
