@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""Set PianoMime up and run it, with nothing but Python 3.11 or newer.
+
+    ./do play [SONG] [OPTIONS]   play a song (the bundled "ode_to_joy" if none is named)
+    ./do test [PYTEST OPTIONS]   run the test suite
+    ./do lint                    run ruff and mypy
+    ./do run COMMAND             run any command inside the environment, such as
+                                 `./do run pianomime --help`
+
+The first call makes the environment .venv beside this file; later calls reuse it until
+pyproject.toml or constraints.txt change. PIANOMIME_VENV names another place for it.
+"""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import venv
+
+ROOT = os.path.dirname(os.path.abspath(__file__))
+VENV = os.path.abspath(os.environ.get("PIANOMIME_VENV", os.path.join(ROOT, ".venv")))
+BIN = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
+PYTHON = os.path.join(BIN, "python.exe" if os.name == "nt" else "python")
+OLDEST = (3, 11)
+DEFAULT_SONG = "ode_to_joy"
+
+
+def stop(message):
+    """End with one clear line."""
+    sys.stderr.write("do: %s\n" % message)
+    sys.exit(2)
+
+
+def use_new_enough_python():
+    """Go on in a newer Python when the one that runs this file is too old."""
+    if sys.version_info >= OLDEST:
+        return
+    for minor in range(14, OLDEST[1] - 1, -1):
+        newer = shutil.which("python3.%d" % minor)
+        # A version manager's shim can be on PATH without a Python behind it.
+        if newer and subprocess.call([newer, "-c", ""], stderr=subprocess.DEVNULL) == 0:
+            os.execv(newer, [newer, os.path.abspath(__file__)] + sys.argv[1:])
+    stop("PianoMime needs Python 3.11 or newer; this is %d.%d" % sys.version_info[:2])
+
+
+def fingerprint(extra):
+    """What the environment holds: when it changes, the installation is brought up to date."""
+    digest = hashlib.sha256(("%s %s " % (ROOT, extra)).encode())
+    for name in ("pyproject.toml", "constraints.txt"):
+        with open(os.path.join(ROOT, name), "rb") as file:
+            digest.update(file.read())
+    return digest.hexdigest()
+
+
+def set_up(extra):
+    """Make the environment, or bring it up to date, with an extra ("" or "dev")."""
+    stamp = os.path.join(VENV, "pianomime-setup")
+    if os.path.exists(PYTHON) and os.path.exists(stamp):
+        with open(stamp) as file:
+            # An environment with the dev extra also serves those who need less.
+            if file.read() in (fingerprint("dev"), fingerprint(extra)):
+                return
+    print("Setting up PianoMime in %s (once; a minute or two) ..." % VENV, flush=True)
+    if not os.path.exists(PYTHON):
+        # Only what is an environment is cleared (a broken one), never a folder of another kind.
+        broken = os.path.exists(os.path.join(VENV, "pyvenv.cfg"))
+        try:
+            venv.EnvBuilder(clear=broken, symlinks=os.name != "nt").create(VENV)
+        except OSError as error:
+            stop("cannot make the environment: %s" % error)
+    if subprocess.call([PYTHON, "-c", "import pip"], stderr=subprocess.DEVNULL) != 0:
+        bootstrap_pip()
+    target = ROOT + ("[%s]" % extra if extra else "")
+    pip = [PYTHON, "-m", "pip", "--quiet", "--disable-pip-version-check", "install"]
+    if subprocess.call(pip + ["-c", os.path.join(ROOT, "constraints.txt"), "-e", target]) != 0:
+        stop("the installation failed; the lines above say why")
+    with open(stamp, "w") as file:
+        file.write(fingerprint(extra))
+
+
+def bootstrap_pip():
+    """Put pip into the environment, also where Debian has split ensurepip off Python."""
+    ensure = [PYTHON, "-m", "ensurepip", "--upgrade", "--default-pip"]
+    if subprocess.call(ensure, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) == 0:
+        return
+    borrow = [sys.executable, "-m", "pip", "--python", PYTHON, "install", "--quiet", "pip"]
+    if subprocess.call(borrow, stderr=subprocess.DEVNULL) != 0:
+        stop("this Python has neither ensurepip nor pip (on Debian: apt install python3-venv)")
+
+
+def main():
+    """Run one of the commands in the docstring above."""
+    use_new_enough_python()
+    command, rest = (sys.argv[1:2] or ["--help"])[0], sys.argv[2:]
+    if command == "play":
+        set_up("")
+        # Options alone still play the default song.
+        song = [] if rest and not rest[0].startswith("-") else [DEFAULT_SONG]
+        run([PYTHON, "-m", "pianomime", "play"] + song + rest)
+    elif command == "test":
+        set_up("dev")
+        os.chdir(ROOT)
+        run([PYTHON, "-m", "pytest", "-n", "2"] + rest)
+    elif command == "lint":
+        set_up("dev")
+        os.chdir(ROOT)
+        checks = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"])
+        sys.exit(max([subprocess.call([PYTHON, "-m"] + check) for check in checks]))
+    elif command == "run" and rest:
+        set_up("")
+        os.environ["PATH"] = BIN + os.pathsep + os.environ["PATH"]
+        run(rest)
+    elif command in ("-h", "--help", "help"):
+        print(__doc__.strip())
+    else:
+        stop("there is no command %r; try ./do --help" % command)
+
+
+def run(command):
+    """Become a command, so that its exit code and Ctrl-C are its own."""
+    program = shutil.which(command[0])
+    if program is None:
+        stop("there is no program %r" % command[0])
+    if os.name == "nt":  # Its exec returns to the shell at once.
+        sys.exit(subprocess.call(command))
+    os.execv(program, command)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit(130)
