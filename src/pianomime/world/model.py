@@ -1,0 +1,257 @@
+"""The MuJoCo model of the piano and the two hands, built from `figures.json`.
+
+World frame: origin at the middle of the keyboard, x toward the player, y along the keyboard
+(treble positive), z up; metres. Order of positions: 88 keys, then per hand (right, left)
+forearm tx, ty, tz, wrist 2, wrist 1, then index to little from knuckle to tip, thumb last.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+
+from pianomime.world.figures import (
+    BLACK,
+    FIGURES,
+    FINGER_PREFIXES,
+    KEYS,
+    PHYSICS_DT,
+    key_centres,
+    key_half_sizes,
+)
+
+Side = Literal["rh", "lh"]
+
+_GEOM_TYPES = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+}
+# Keys and hands touch each other, but no hand touches a hand (as in the paper's world).
+_HAND_MASK = {"contype": 1, "conaffinity": 0}
+_KEY_MASK = {"contype": 0, "conaffinity": 1}
+_FOREARM_BASE = {"rh": (0.4, 0.15, 0.13), "lh": (0.4, -0.15, 0.13)}
+_FOREARM_QUAT = (-0.5, -0.5, 0.5, 0.5)
+
+
+def build_spec() -> mujoco.MjSpec:
+    """Piano and both hands, nothing for the eye but plain colours."""
+    spec = _empty_spec()
+    add_piano(spec)
+    add_hand(spec, "rh")
+    add_hand(spec, "lh")
+    return spec
+
+
+@cache
+def world_model() -> mujoco.MjModel:
+    """The compiled model of `build_spec`, compiled once; treat it as read-only."""
+    return build_spec().compile()
+
+
+@cache
+def hand_model(side: Side) -> mujoco.MjModel:
+    """One hand alone, without keys: for kinematics and inverse dynamics. Read-only."""
+    spec = _empty_spec()
+    add_hand(spec, side)
+    return spec.compile()
+
+
+def add_piano(spec: mujoco.MjSpec) -> None:
+    """Add the 88 keys, each a hinged box, and the piano's base."""
+    figures = FIGURES["keyboard"]
+    piano = spec.worldbody.add_body(name="piano")
+    piano.add_geom(
+        name="piano_base",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=figures["base"]["pos"],
+        size=figures["base"]["half_size"],
+        rgba=(0.15, 0.15, 0.15, 1.0),
+        contype=0,
+        conaffinity=0,
+    )
+    centres, half_sizes = key_centres(), key_half_sizes()
+    for key in range(KEYS):
+        colour = figures["black" if BLACK[key] else "white"]
+        hinge = (-half_sizes[key, 0], 0.0, 0.0)
+        body = piano.add_body(name=f"key_{key}", pos=centres[key])
+        body.add_joint(
+            name=f"key_{key}",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=(0.0, 1.0, 0.0),
+            pos=hinge,
+            range=colour["range"],
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            stiffness=_first_order(figures["joint"]["stiffness"]),
+            springref=figures["joint"]["springref"],
+            damping=_first_order(figures["joint"]["damping"]),
+            armature=figures["joint"]["armature"],
+        )
+        body.add_geom(
+            name=f"key_{key}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=half_sizes[key],
+            mass=colour["mass"],
+            rgba=(0.1, 0.1, 0.1, 1.0) if BLACK[key] else (0.95, 0.95, 0.93, 1.0),
+            **figures["contact"],
+            **_KEY_MASK,
+        )
+
+
+def add_hand(spec: mujoco.MjSpec, side: Side) -> None:
+    """Add one hand with its sliding forearm; the left is the right mirrored in its x axis."""
+    hand = FIGURES["hand"]
+    mirror = -1.0 if side == "lh" else 1.0
+    bodies: dict[str, mujoco.MjsBody] = {}
+    for shape, vertices in FIGURES["fingertip_hulls"].items():
+        spec.add_mesh(name=f"{side}_{shape}_tip", uservert=np.ravel(vertices))
+    for figures in hand["bodies"]:
+        name = figures["name"]
+        if figures["parent"] is None:
+            parent, pos, quat = spec.worldbody, _FOREARM_BASE[side], _FOREARM_QUAT
+        else:
+            parent = bodies[figures["parent"]]
+            pos, quat = _mirror_pos(figures["pos"], mirror), _mirror_quat(figures, "quat", mirror)
+        body = parent.add_body(
+            name=f"{side}_{name}",
+            pos=pos,
+            quat=quat,
+            mass=figures["mass"],
+            ipos=_mirror_pos(figures["com"], mirror),
+            iquat=_mirror_quat(figures, "inertia_quat", mirror),
+            inertia=figures["inertia"],
+            explicitinertial=True,
+            gravcomp=1.0,
+        )
+        bodies[name] = body
+        for joint in figures["joints"]:
+            _add_joint(body, joint, side, mirror)
+        for geom in figures["geoms"]:
+            _add_geom(body, geom, side, mirror)
+        if "fingertip" in figures:
+            body.add_site(
+                name=f"{side}_{name.removesuffix('distal')}_tip",
+                pos=_mirror_pos(figures["fingertip"], mirror),
+            )
+        if name == "wrist":
+            body.add_site(name=f"{side}_wrist")
+    for name, joints in hand["tendons"].items():
+        tendon = spec.add_tendon(name=f"{side}_{name}")
+        for joint in joints:
+            tendon.wrap_joint(f"{side}_{joint}", 1.0)
+    for actuator in hand["actuators"]:
+        _add_actuator(spec, actuator, side)
+    for one, other in hand["contact_excludes"]:
+        spec.add_exclude(bodyname1=f"{side}_{one}", bodyname2=f"{side}_{other}")
+
+
+def fingertip_sites(side: Side) -> list[str]:
+    """Site names of a hand's points in plan order: wrist, thumb, index .. little."""
+    return [f"{side}_wrist", *(f"{side}_{finger}_tip" for finger in FINGER_PREFIXES)]
+
+
+def _empty_spec() -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    physics = FIGURES["physics"]
+    spec.option.timestep = PHYSICS_DT
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    spec.option.iterations = physics["iterations"]
+    spec.option.ls_iterations = physics["ls_iterations"]
+    spec.option.impratio = physics["impratio"]
+    spec.option.gravity = physics["gravity"]
+    # Resting keys (88 of 142 degrees of freedom) sleep until something touches them.
+    spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    # MuJoCo 4.0.0 solves islands with sparse Jacobians wrongly once in a while: a finger that
+    # touches two keys is thrown off at 1000 rad/s. Dense ones are right, and faster here.
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    # The convex collider of MuJoCo 3.0, which the paper's world was made with.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_NATIVECCD)
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
+    spec.compiler.degree = False
+    return spec
+
+
+def _add_joint(
+    body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float
+) -> None:
+    slide = figures.get("type") == "slide"
+    x, y, z = figures["axis"]
+    # Forearms slide along the same world axes on both sides; a mirrored hinge axis turns round.
+    axis = (x, y, z) if slide else (x, mirror * y, mirror * z)
+    body.add_joint(
+        name=f"{side}_{figures['name']}",
+        type=mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE,
+        axis=axis,
+        range=_range(figures, figures["name"], side),
+        limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        damping=_first_order(figures["damping"]),
+        **FIGURES["hand"]["joint"],
+    )
+
+
+def _add_geom(body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float) -> None:
+    look = {"rgba": (0.25, 0.27, 0.32, 1.0), "group": 2}
+    contact = {**FIGURES["hand"]["contact"], **_HAND_MASK}
+    if figures["type"] == "hull":
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"{side}_{figures['hull']}_tip",
+            **contact,
+            **look,
+        )
+        return
+    size = [*figures["size"], 0.0, 0.0][:3]
+    body.add_geom(
+        type=_GEOM_TYPES[figures["type"]],
+        size=size,
+        pos=_mirror_pos(figures["pos"], mirror),
+        quat=_mirror_quat(figures, "quat", mirror),
+        **contact,
+        **look,
+    )
+
+
+def _add_actuator(spec: mujoco.MjSpec, figures: dict[str, Any], side: Side) -> None:
+    kind = "joint" if "joint" in figures else "tendon"
+    gain = figures["kp"]
+    actuator = spec.add_actuator(
+        name=f"{side}_{figures[kind]}",
+        trntype=getattr(mujoco.mjtTrn, f"mjTRN_{kind.upper()}"),
+        target=f"{side}_{figures[kind]}",
+        gainprm=[gain, *[0.0] * 9],
+        biasprm=[0.0, -gain, *[0.0] * 8],
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        ctrlrange=_range(figures, figures[kind], side),
+    )
+    if "force" in figures:
+        actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        actuator.forcerange = (-figures["force"], figures["force"])
+
+
+def _range(figures: dict[str, Any], joint: str, side: Side) -> tuple[float, float]:
+    low, high = figures["range"]
+    # tx is the same world direction on both sides, so its range is mirrored.
+    return (-high, -low) if side == "lh" and joint == "forearm_tx" else (low, high)
+
+
+def _mirror_pos(pos: list[float], mirror: float) -> tuple[float, float, float]:
+    return (mirror * pos[0], pos[1], pos[2])
+
+
+def _mirror_quat(
+    figures: dict[str, Any], name: str, mirror: float
+) -> tuple[float, float, float, float]:
+    w, x, y, z = figures.get(name, (1.0, 0.0, 0.0, 0.0))
+    return (w, x, mirror * y, mirror * z)
+
+
+def _first_order(value: float) -> list[float]:
+    """MuJoCo 4 takes springs and dampers as polynomials; ours are linear."""
+    return [value, 0.0, 0.0]

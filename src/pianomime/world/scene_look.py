@@ -1,0 +1,249 @@
+"""How the world looks: a stage, lights, cameras, materials and skins for the hands.
+
+Nothing here touches the physics. The shapes that collide are boxes and capsules; where they look
+crude they are hidden behind skins without mass or contact, each the hull of a few spheres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.world.figures import BLACK, KEYS
+
+CAMERAS = ("player", "top", "side")
+"""Names of the cameras: over the player's shoulders, straight down, from the treble end."""
+
+WHITE_KEY = (0.93, 0.92, 0.89)
+BLACK_KEY = (0.07, 0.07, 0.08)
+PRESSED_KEY = (0.25, 0.78, 0.42)
+"""Colours (red, green, blue), 0..1."""
+
+# The same two hues tell the hands apart in every picture of a performance.
+_ACCENT = {"lh": (0.26, 0.52, 0.83, 1.0), "rh": (0.95, 0.55, 0.22, 1.0)}
+_HIDDEN_GROUP = 3
+_SKIN_GROUP = 1
+
+_Sphere: TypeAlias = tuple[tuple[float, float, float], float]
+
+# Spheres (centre, radius) [m] in the frame of a body of the right hand; the left is mirrored in x.
+_SKINS: dict[str, tuple[tuple[str, Sequence[_Sphere]], ...]] = {
+    "forearm": (
+        ("shell", (((0.0, 0.0, 0.0), 0.043), ((0.0, -0.008, 0.17), 0.027))),
+        ("accent", (((0.0, -0.008, 0.176), 0.0275), ((0.0, -0.009, 0.188), 0.0265))),
+    ),
+    "wrist": (
+        (
+            "joint",
+            (
+                ((-0.010, 0.0, -0.012), 0.015),
+                ((0.010, 0.0, -0.012), 0.015),
+                ((-0.014, 0.0, 0.034), 0.012),
+                ((0.016, 0.0, 0.034), 0.012),
+            ),
+        ),
+    ),
+    "palm": (
+        (
+            "shell",
+            (
+                ((-0.026, 0.0, 0.006), 0.011),
+                ((0.026, 0.0, 0.004), 0.011),
+                ((-0.030, 0.0, 0.030), 0.011),
+                ((-0.012, 0.002, 0.084), 0.009),
+                ((0.010, 0.002, 0.087), 0.009),
+                ((0.034, 0.002, 0.082), 0.009),
+                ((0.031, -0.006, 0.030), 0.012),
+            ),
+        ),
+    ),
+    "lfmetacarpal": (
+        (
+            "shell",
+            (
+                ((0.001, 0.0, 0.010), 0.010),
+                ((-0.001, 0.002, 0.052), 0.009),
+                ((0.012, 0.0, 0.014), 0.009),
+                ((0.012, 0.002, 0.054), 0.008),
+            ),
+        ),
+    ),
+}
+
+
+def dress(spec: mujoco.MjSpec) -> None:
+    """Give a spec of piano and hands its looks; its physics stays as it is.
+
+    Args:
+        spec: as `pianomime.world.model.build_spec` makes it, changed in place.
+    """
+    _set_up_rendering(spec)
+    _add_materials(spec)
+    _add_stage(spec)
+    _add_cameras(spec)
+    for key in range(KEYS):
+        spec.geom(f"key_{key}").material = "black_key" if BLACK[key] else "white_key"
+    for body in spec.bodies:
+        side, _, name = body.name.partition("_")
+        if side in _ACCENT:
+            _dress_body(spec, body, side, name)
+
+
+def key_colours(pressed: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Colours of the keys (..., 88, 3), 0..1, from which of them are pressed (..., 88)."""
+    resting = np.where(BLACK[:, None], BLACK_KEY, WHITE_KEY)
+    # A black key in the full colour would look like a white one.
+    down = np.where(BLACK[:, None], 0.7 * np.array(PRESSED_KEY), PRESSED_KEY)
+    return np.where(pressed[..., None], down, resting).astype(np.float32)
+
+
+def _set_up_rendering(spec: mujoco.MjSpec) -> None:
+    visual = spec.visual
+    visual.global_.offwidth, visual.global_.offheight = 3840, 2160
+    # Enough for this scene, and what software OpenGL draws in reasonable time.
+    visual.quality.shadowsize = 1024
+    visual.quality.offsamples = 4
+    visual.quality.numslices, visual.quality.numstacks = 20, 10
+    visual.map.znear, visual.map.zfar = 0.05, 10.0
+    visual.map.shadowclip = 0.8
+    visual.headlight.ambient = (0.32, 0.32, 0.34)
+    visual.headlight.diffuse = (0.22, 0.22, 0.22)
+    visual.headlight.specular = (0.0, 0.0, 0.0)
+    # MuJoCo derives clipping planes and light sizes from the model's extent.
+    spec.stat.center = (0.1, 0.0, 0.0)
+    spec.stat.extent = 1.0
+
+
+def _add_materials(spec: mujoco.MjSpec) -> None:
+    for name, rgb, specular, shininess in (
+        ("white_key", WHITE_KEY, 0.25, 0.6),
+        ("black_key", BLACK_KEY, 0.5, 0.7),
+        ("lacquer", (0.035, 0.035, 0.042), 0.6, 0.8),
+        ("felt", (0.36, 0.06, 0.09), 0.0, 0.0),
+        ("stage", (0.17, 0.18, 0.21), 0.05, 0.1),
+        ("shell", (0.80, 0.82, 0.85), 0.35, 0.5),
+        ("joint", (0.15, 0.16, 0.19), 0.4, 0.5),
+        ("accent_lh", _ACCENT["lh"], 0.3, 0.5),
+        ("accent_rh", _ACCENT["rh"], 0.3, 0.5),
+    ):
+        spec.add_material(
+            name=name, rgba=(*rgb[:3], 1.0), specular=specular, shininess=shininess
+        )
+
+
+def _add_stage(spec: mujoco.MjSpec) -> None:
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=(0.20, 0.22, 0.27),
+        rgb2=(0.05, 0.05, 0.07),
+        width=64,
+        height=384,
+    )
+    world = spec.worldbody
+    world.add_light(
+        name="key_light",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=(0.5, -0.7, 1.4),
+        dir=(-0.30, 0.45, -1.0),
+        diffuse=(0.62, 0.60, 0.57),
+        specular=(0.45, 0.45, 0.45),
+        castshadow=True,
+    )
+    world.add_geom(
+        name="stage",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        pos=(0.0, 0.0, -0.05),
+        size=(3.0, 3.0, 0.1),
+        material="stage",
+        contype=0,
+        conaffinity=0,
+    )
+    base = spec.geom("piano_base")
+    base.material = "lacquer"
+    base.rgba = (0.035, 0.035, 0.042, 1.0)
+    half_width = float(base.size[1])
+    for name, material, pos, half_size in (
+        ("cheek_left", "lacquer", (-0.05, -half_width - 0.022, -0.005), (0.127, 0.02, 0.045)),
+        ("cheek_right", "lacquer", (-0.05, half_width + 0.022, -0.005), (0.127, 0.02, 0.045)),
+        ("key_bed", "lacquer", (-0.05, 0.0, -0.034), (0.127, half_width + 0.002, 0.016)),
+        ("felt_strip", "felt", (-0.0765, 0.0, 0.0275), (0.0015, half_width, 0.006)),
+    ):
+        world.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=pos,
+            size=half_size,
+            material=material,
+            contype=0,
+            conaffinity=0,
+        )
+
+
+def _add_cameras(spec: mujoco.MjSpec) -> None:
+    # A narrow view from afar keeps the outer keys from fanning out.
+    for name, pos, target, fovy in (
+        ("player", (1.22, 0.0, 1.50), (0.075, 0.0, 0.0), 17.5),
+        ("top", (0.10, 0.0, 2.20), (0.0999, 0.0, 0.0), 16.0),
+        ("side", (0.62, 1.15, 0.55), (0.08, 0.12, 0.03), 30.0),
+    ):
+        assert name in CAMERAS
+        spec.worldbody.add_camera(name=name, pos=pos, quat=_look_at(pos, target), fovy=fovy)
+
+
+def _dress_body(spec: mujoco.MjSpec, body: mujoco.MjsBody, side: str, name: str) -> None:
+    skins = _SKINS.get(name, ())
+    for geom in body.geoms:
+        if skins:
+            geom.group = _HIDDEN_GROUP
+            continue
+        if name.endswith("distal"):
+            material = f"accent_{side}"
+        elif name.endswith(("knuckle", "hub", "base")):
+            material = "joint"
+        else:
+            material = "shell"
+        geom.material = material
+        geom.rgba = spec.material(material).rgba
+    mirror = np.array([-1.0 if side == "lh" else 1.0, 1.0, 1.0])
+    for number, (look, spheres) in enumerate(skins):
+        mesh = f"{body.name}_skin_{number}"
+        material = f"accent_{side}" if look == "accent" else look
+        spec.add_mesh(name=mesh, uservert=(_hull_points(spheres) * mirror).ravel())
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=mesh,
+            material=material,
+            mass=0.0,
+            contype=0,
+            conaffinity=0,
+            group=_SKIN_GROUP,
+        )
+
+
+def _hull_points(spheres: Sequence[_Sphere]) -> NDArray[np.float64]:
+    """Points (N, 3) on some spheres; the hull that MuJoCo puts around them is their skin."""
+    polar, around = np.meshgrid(
+        np.linspace(0.0, np.pi, 9), np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+    )
+    direction = np.stack(
+        (np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)), axis=-1
+    ).reshape(-1, 3)
+    return np.concatenate([centre + radius * direction for centre, radius in spheres])
+
+
+def _look_at(pos: Sequence[float], target: Sequence[float]) -> NDArray[np.float64]:
+    """Quaternion (4,) of a camera at `pos` that looks at `target`, treble to its right."""
+    back = np.subtract(pos, target)
+    back /= np.linalg.norm(back)
+    # Seen from the treble end, the keyboard's y axis is no longer the horizontal of the picture.
+    right = np.cross((0.0, 0.0, 1.0), back)
+    right /= np.linalg.norm(right)
+    quat = np.empty(4)
+    mujoco.mju_mat2Quat(quat, np.column_stack((right, np.cross(back, right), back)).ravel())
+    return quat
