@@ -1,0 +1,179 @@
+"""MIDI files to and from scores.
+
+Parsing is symusic's: of the two parsers at hand it is the strict one (a file that is cut off or
+has bytes changed is an error, never junk or a crash), it keeps zero-length notes, and it takes
+milliseconds where mido under pretty_midi takes seconds. Only its ticks are used. Its seconds are
+float32; here they are float64 and computed the way pretty_midi does, which decides on which side
+of a frame boundary a note falls and makes rolls equal to RoboPianist's cell for cell.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.files import atomic
+from pianomime.music.score import KEYS, LOWEST_PITCH, MAX_SECONDS, Score, ScoreError
+
+SUSTAIN_PEDAL = 64
+PEDAL_DOWN = 64
+"""Control number of the sustain pedal, and the lowest value at which it is down."""
+
+WRITTEN_TICKS_PER_BEAT = 960
+WRITTEN_BEATS_PER_MINUTE = 120
+"""A frame of 0.05 s is 96 ticks: rolls survive writing and reading."""
+
+
+def read_midi(path: Path) -> Score:
+    """See `Score.from_midi`."""
+    midi = _parse(path)
+    clock = _Clock(midi, path)
+    # Drums are left out; their channel has no pitches.
+    tracks = [track for track in midi.tracks if not track.is_drum]
+    notes = [track.notes.numpy() for track in tracks if len(track.notes)]
+    if not notes:
+        raise ScoreError(f"{path} has no piano notes")
+    begin = np.concatenate([each["time"] for each in notes]).astype(np.int64)
+    end = begin + np.concatenate([each["duration"] for each in notes])
+    key = np.concatenate([each["pitch"] for each in notes]).astype(np.int64) - LOWEST_PITCH
+    velocity = np.concatenate([each["velocity"] for each in notes]).astype(np.int64)
+
+    on_piano = (key >= 0) & (key < KEYS)
+    left_out = int((~on_piano).sum())
+    if left_out == len(key):
+        raise ScoreError(f"{path} has no notes within the range of a piano")
+    if left_out:
+        warnings.warn(
+            f"{path}: {left_out} of {len(key)} notes are outside the range of a piano and left out",
+            stacklevel=3,
+        )
+    key, begin, end, velocity = _join_doubled(
+        key[on_piano], begin[on_piano], end[on_piano], velocity[on_piano]
+    )
+    if begin.min() < 0 or (end < begin).any() or clock.seconds(end).max() > MAX_SECONDS:
+        raise ScoreError(f"{path} is damaged, or longer than {MAX_SECONDS / 3600:.0f} hours")
+    return Score(
+        key=key,
+        onset=clock.seconds(begin),
+        offset=clock.seconds(end),
+        velocity=velocity,
+        pedal=clock.seconds(_pedal_ticks(tracks, int(end.max()))),
+        title=path.stem,
+    )
+
+
+def write_midi(score: Score, path: Path) -> None:
+    """See `Score.to_midi`."""
+    import symusic
+
+    rate = WRITTEN_TICKS_PER_BEAT * WRITTEN_BEATS_PER_MINUTE / 60
+    begin = np.rint(score.onset * rate).astype(np.int32)
+    end = np.rint(score.offset * rate).astype(np.int32)
+    piano: Any = symusic.Track(name=score.title, program=0, is_drum=False)
+    piano.notes = symusic.Note.from_numpy(
+        time=begin,
+        duration=end - begin,
+        pitch=(score.key + LOWEST_PITCH).astype(np.int8),
+        velocity=score.velocity.astype(np.int8),
+    )
+    for on, off in np.rint(score.pedal * rate).astype(int).tolist():
+        piano.controls.append(symusic.ControlChange(on, SUSTAIN_PEDAL, 127))
+        piano.controls.append(symusic.ControlChange(off, SUSTAIN_PEDAL, 0))
+    midi: Any = symusic.Score(WRITTEN_TICKS_PER_BEAT)
+    midi.tempos.append(symusic.Tempo(0, WRITTEN_BEATS_PER_MINUTE))
+    midi.tracks.append(piano)
+    with atomic(path) as temporary:
+        temporary.write_bytes(midi.dumps_midi())
+
+
+def _parse(path: Path) -> Any:
+    """The file as a symusic score in ticks."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise ScoreError(f"{path} does not exist") from None
+    except IsADirectoryError:
+        raise ScoreError(f"{path} is a folder, not a MIDI file") from None
+    except OSError as error:
+        raise ScoreError(f"{path} cannot be read: {error.strerror}") from error
+    if not content:
+        raise ScoreError(f"{path} is empty")
+    if not content.startswith(b"MThd"):
+        raise ScoreError(f"{path} is not a MIDI file")
+    if len(content) >= 14 and content[12] >= 0x80:
+        raise ScoreError(f"{path} is timed by SMPTE codes; only beats are supported")
+
+    import symusic
+
+    try:
+        midi: Any = symusic.Score.from_midi(content)
+    except (RuntimeError, ValueError) as error:
+        raise ScoreError(f"{path} is a damaged or incomplete MIDI file") from error
+    if midi.ticks_per_quarter < 1:
+        raise ScoreError(f"{path} is damaged: it has no ticks in a beat")
+    return midi
+
+
+class _Clock:
+    """From ticks to seconds, along the tempo changes of one file."""
+
+    def __init__(self, midi: Any, path: Path) -> None:
+        changes = midi.tempos.numpy()
+        tick = changes["time"].astype(np.int64)
+        micros_per_beat = changes["mspq"].astype(np.float64)
+        if (micros_per_beat <= 0).any():
+            raise ScoreError(f"{path} is damaged: it has a tempo of zero")
+        # A file that says nothing begins at 120 beats a minute.
+        tick = np.append(0, tick)
+        micros_per_beat = np.append(500_000.0, micros_per_beat)
+        # In this very order, as pretty_midi computes it: see the top of this file.
+        self.tick_seconds = 60.0 / ((6e7 / micros_per_beat) * midi.ticks_per_quarter)
+        self.tick = tick
+        self.second = np.append(0.0, np.cumsum(np.diff(tick) * self.tick_seconds[:-1]))
+
+    def seconds(self, tick: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Seconds at each tick, any shape."""
+        tempo = np.maximum(np.searchsorted(self.tick, tick, side="left") - 1, 0)
+        return np.asarray(
+            self.second[tempo] + (tick - self.tick[tempo]) * self.tick_seconds[tempo], np.float64
+        )
+
+
+def _join_doubled(
+    key: NDArray[np.int64],
+    begin: NDArray[np.int64],
+    end: NDArray[np.int64],
+    velocity: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], ...]:
+    """Make one note, the longest and loudest, of those that strike one key at one instant."""
+    order = np.lexsort((key, begin))
+    key, begin, end, velocity = key[order], begin[order], end[order], velocity[order]
+    first = np.flatnonzero(np.append(True, (np.diff(key) != 0) | (np.diff(begin) != 0)))
+    return (
+        key[first],
+        begin[first],
+        np.maximum.reduceat(end, first),
+        np.maximum.reduceat(velocity, first),
+    )
+
+
+def _pedal_ticks(tracks: list[Any], last_tick: int) -> NDArray[np.int64]:
+    """(P, 2) ticks of the sustain pedal: a piano has one, whichever track moves it."""
+    controls = [track.controls.numpy() for track in tracks if len(track.controls)]
+    if not controls:
+        return np.zeros((0, 2), np.int64)
+    tick = np.concatenate([each["time"] for each in controls]).astype(np.int64)
+    number = np.concatenate([each["number"] for each in controls])
+    down = np.concatenate([each["value"] for each in controls]) >= PEDAL_DOWN
+    tick, down = tick[number == SUSTAIN_PEDAL], down[number == SUSTAIN_PEDAL]
+    order = np.argsort(tick, kind="stable")
+    tick, down = tick[order], down[order]
+    moves = np.flatnonzero(np.diff(np.append(False, down)))
+    # A pedal that never comes up is held until the last note ends.
+    end = np.append(tick[moves], last_tick)
+    pedal: NDArray[np.int64] = end[: len(end) // 2 * 2].reshape(-1, 2)
+    return np.maximum(pedal, pedal[:, :1])

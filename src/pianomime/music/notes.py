@@ -1,0 +1,37 @@
+"""From a roll back to notes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pianomime.music.score import KEYS, ScoreError
+
+
+def notes_from_roll(
+    roll: ArrayLike, dt: float = 0.05
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """The notes in a roll: each run of frames with a key down is one.
+
+    Args:
+        roll: (T, 88) bool, such as the keys that were pressed.
+        dt: length of a frame [s].
+
+    Returns:
+        key (N,) int64, onset (N,) and offset (N,) float64 [s], sorted by (onset, key).
+
+    Raises:
+        ScoreError: the roll has another shape.
+    """
+    down = np.asarray(roll, bool)
+    if down.ndim != 2 or down.shape[1] != KEYS:
+        raise ScoreError(f"a roll must be (T, {KEYS}), not {down.shape}")
+    silent = np.zeros((KEYS, 1), bool)
+    edges = np.diff(np.hstack((silent, down.T, silent)).astype(np.int8), axis=1)
+    key, first = np.nonzero(edges == 1)
+    _, stop = np.nonzero(edges == -1)
+    order = np.lexsort((key, first))
+    # Dividing by the frame rate gives the floats that multiplying by it turns back into the very
+    # same frames (exact for 20 a second); first * dt does not.
+    rate = 1.0 / dt
+    return key[order], first[order] / rate, stop[order] / rate

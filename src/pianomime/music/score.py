@@ -1,0 +1,279 @@
+"""Score: what is to be played, in seconds, and its piano roll, in frames."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+KEYS = 88
+LOWEST_PITCH = 21
+"""MIDI pitch of key 0, the A at the bass end of the keyboard."""
+
+MAX_SECONDS = 24 * 3600.0
+"""Longest score. A damaged MIDI file can claim years; its roll would not fit in memory."""
+
+
+class ScoreError(ValueError):
+    """Music that cannot be read or makes no sense; the message is one line for the user."""
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Notes and pedal of a piece; N notes sorted by (onset, key), P pedal intervals.
+
+    The arrays are copied, sorted and made read-only, so a score never changes.
+
+    Attributes:
+        key: (N,) int64, 0..87 from the bass end of the keyboard.
+        onset: (N,) float64 [s], when the key goes down.
+        offset: (N,) float64 [s], when it comes up; never before the onset.
+        velocity: (N,) int64, 1..127, how hard it is struck (MIDI).
+        pedal: (P, 2) float64 [s], intervals [on, off) with the sustain pedal down, in order and
+            apart from each other.
+        title: name of the piece.
+
+    Raises:
+        ScoreError: shapes, ranges or times make no sense.
+    """
+
+    key: NDArray[np.int64]
+    onset: NDArray[np.float64]
+    offset: NDArray[np.float64]
+    velocity: NDArray[np.int64]
+    pedal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    title: str = ""
+
+    def __post_init__(self) -> None:
+        key = np.array(self.key, np.int64)
+        onset = np.array(self.onset, np.float64)
+        offset = np.array(self.offset, np.float64)
+        velocity = np.array(self.velocity, np.int64)
+        if key.ndim != 1 or not key.shape == onset.shape == offset.shape == velocity.shape:
+            raise ScoreError("key, onset, offset and velocity must each be (N,)")
+        if key.size and not (key.min() >= 0 and key.max() < KEYS):
+            raise ScoreError(f"keys must be 0..{KEYS - 1}")
+        if velocity.size and not (velocity.min() >= 1 and velocity.max() <= 127):
+            raise ScoreError("velocities must be 1..127")
+        # Written so that NaN fails too.
+        if not ((onset >= 0) & (offset >= onset) & (offset <= MAX_SECONDS)).all():
+            raise ScoreError(
+                f"notes must begin at 0 s or later, end no earlier than they begin, "
+                f"and end within {MAX_SECONDS / 3600:.0f} hours"
+            )
+        order = np.lexsort((key, onset))
+        for name, array in (
+            ("key", key[order]),
+            ("onset", onset[order]),
+            ("offset", offset[order]),
+            ("velocity", velocity[order]),
+            ("pedal", _tidy_pedal(self.pedal)),
+        ):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def from_midi(cls, path: str | os.PathLike[str]) -> Score:
+        """Read a MIDI file: every track but the drums, tempo changes, sustain pedal (CC64 >= 64).
+
+        Notes that no piano has (outside MIDI pitch 21..108) are left out with one warning. A key
+        that two tracks strike at the same instant is one note. The title is the file's name.
+
+        Raises:
+            ScoreError: no such file, not a MIDI file, a damaged one, or one without piano notes.
+        """
+        from pianomime.music.midi import read_midi
+
+        return read_midi(Path(path))
+
+    def to_midi(self, path: str | os.PathLike[str]) -> None:
+        """Write a MIDI file with one piano track; times are rounded to 1/1920 s.
+
+        Times on the 0.05 s grid, and so rolls, come back from `from_midi` unchanged.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        from pianomime.music.midi import write_midi
+
+        write_midi(self, Path(path))
+
+    @classmethod
+    def from_roll(cls, roll: ArrayLike, dt: float = 0.05, title: str = "") -> Score:
+        """The score whose keys are down exactly where a roll says so, without pedal.
+
+        Args:
+            roll: (T, 88) bool.
+            dt: length of a frame [s].
+            title: name of the piece.
+
+        Raises:
+            ScoreError: the roll has another shape.
+        """
+        from pianomime.music.notes import notes_from_roll
+
+        key, onset, offset = notes_from_roll(roll, dt)
+        return cls(key, onset, offset, np.full(len(key), 80), title=title)
+
+    def __len__(self) -> int:
+        """Number of notes."""
+        return len(self.key)
+
+    @property
+    def duration(self) -> float:
+        """When the last note ends [s]; 0 without notes."""
+        return float(self.offset.max(initial=0.0))
+
+    def clip(self, start: float, end: float) -> Score:
+        """What sounds between two times [s], shifted to begin at 0; notes and pedal are cut.
+
+        Raises:
+            ScoreError: `start` is not before `end`, or nothing sounds between them.
+        """
+        if not 0 <= start < end:
+            raise ScoreError(f"cannot clip from {start:g} s to {end:g} s")
+        inside = (self.onset < end) & ((self.offset > start) | (self.onset >= start))
+        if not inside.any():
+            raise ScoreError(
+                f"no notes between {start:g} s and {end:g} s: the piece lasts {self.duration:.1f} s"
+            )
+        return replace(
+            self,
+            key=self.key[inside],
+            onset=np.maximum(self.onset[inside], start) - start,
+            offset=np.minimum(self.offset[inside], end) - start,
+            velocity=self.velocity[inside],
+            pedal=_cut_pedal(self.pedal, start, end),
+        )
+
+    def trim_silence(self) -> Score:
+        """The same music with its first note at 0 s."""
+        if not len(self):
+            return self
+        start = self.onset[0]
+        return replace(
+            self,
+            onset=self.onset - start,
+            offset=self.offset - start,
+            pedal=_cut_pedal(self.pedal, start, math.inf),
+        )
+
+    def transpose(self, semitones: int) -> Score:
+        """The same music moved along the keyboard, upward for positive `semitones`.
+
+        Raises:
+            ScoreError: a note would leave the keyboard.
+        """
+        return replace(self, key=self.key + semitones)
+
+    def frames(self, dt: float = 0.05) -> int:
+        """Number of frames T of the roll: floor(duration / dt) + 1.
+
+        So a piece that ends exactly on a frame boundary has one silent frame after it, as in
+        RoboPianist's rolls.
+        """
+        return math.floor(self.duration * _rate(dt)) + 1
+
+    def note_frames(self, dt: float = 0.05) -> NDArray[np.int64]:
+        """The frames in which each note holds its key down.
+
+        A note begins in frame floor(onset / dt) and ends before frame ceil(offset / dt), but
+        lasts at least one frame. A key struck again while it is down is up for that frame, and
+        down from the next one on (RoboPianist's rule); it stays down until every note on it has
+        ended. The frames of two notes on one key never overlap, and all together are the roll.
+
+        Returns:
+            (N, 2) int64: first frame, and one past the last. Both are equal for a note that is
+            struck again before it could be heard (within its first frame, or in each of two
+            frames in a row): it has no frame of its own.
+        """
+        rate = _rate(dt)
+        # Plain rounding of floating-point products, without tolerance: only so are the rolls
+        # those of RoboPianist cell for cell, its rounding noise included.
+        begins = np.floor(self.onset * rate).astype(np.int64)
+        ends = np.maximum(np.ceil(self.offset * rate).astype(np.int64), begins + 1)
+        order = np.lexsort((begins, self.key))
+        # Each note depends on the one before it on the same key: a loop over Python ints.
+        spans: list[list[int]] = []
+        last_key, held = -1, 0
+        for key, begin, end in zip(
+            self.key[order].tolist(), begins[order].tolist(), ends[order].tolist(), strict=True
+        ):
+            first = begin
+            if key != last_key:
+                last_key, held = key, end
+            else:
+                held = max(held, end)
+                before = spans[-1]
+                if before[0] >= begin:  # not down yet: this note takes its place
+                    first = before[0]
+                    before[1] = first
+                elif before[1] >= begin:  # down: release it for one frame
+                    first = begin + 1
+                    before[1] = begin
+            spans.append([first, max(held, first + 1)])
+        frames = np.empty((len(self), 2), np.int64)
+        frames[order] = np.reshape(np.array(spans, np.int64), (-1, 2))
+        return frames
+
+    def roll(self, dt: float = 0.05) -> NDArray[np.bool_]:
+        """Which keys are down in each frame, see `note_frames`.
+
+        Args:
+            dt: length of a frame [s].
+
+        Returns:
+            (T, 88) bool, T as in `frames`.
+        """
+        spans = self.note_frames(dt)
+        # A short note at the very end, struck again, may need one frame more than the rule gives.
+        down = np.zeros((max(self.frames(dt), int(spans.max(initial=0))), KEYS), bool)
+        for key, (first, stop) in zip(self.key.tolist(), spans.tolist(), strict=True):
+            down[first:stop, key] = True
+        return down
+
+    def pedal_roll(self, dt: float = 0.05) -> NDArray[np.bool_]:
+        """Whether the sustain pedal is down in each frame: its state when the frame ends.
+
+        Returns:
+            (T,) bool, one entry for each frame of `roll`.
+        """
+        spans = np.floor(self.pedal * _rate(dt)).astype(np.int64)
+        down = np.zeros(len(self.roll(dt)), bool)
+        for first, stop in spans.tolist():
+            down[first:stop] = True
+        return down
+
+
+def _rate(dt: float) -> float:
+    """Frames a second. Multiplying by 20.0 is exact where dividing by 0.05 is not."""
+    if not dt > 0:
+        raise ValueError(f"dt must be positive, not {dt}")
+    return 1.0 / dt
+
+
+def _tidy_pedal(pedal: ArrayLike) -> NDArray[np.float64]:
+    """Intervals in order, those that touch or overlap joined, empty ones left out."""
+    given = np.array(pedal, np.float64)
+    if given.size == 0:
+        return np.zeros((0, 2))
+    if given.ndim != 2 or given.shape[1] != 2:
+        raise ScoreError(f"pedal must be (P, 2), not {given.shape}")
+    if not ((given[:, 0] >= 0) & (given[:, 1] >= given[:, 0]) & np.isfinite(given[:, 1])).all():
+        raise ScoreError("pedal intervals must begin at 0 s or later and end after they begin")
+    given = given[given[:, 1] > given[:, 0]]
+    given = given[np.argsort(given[:, 0], kind="stable")]
+    if len(given) == 0:
+        return given
+    latest = np.maximum.accumulate(given[:, 1])
+    begins = np.append(True, given[1:, 0] > latest[:-1])
+    ends = np.append(begins[1:], True)
+    return np.column_stack((given[begins, 0], latest[ends]))
+
+
+def _cut_pedal(pedal: NDArray[np.float64], start: float, end: float) -> NDArray[np.float64]:
+    return np.asarray(np.maximum(np.clip(pedal, start, end) - start, 0.0))
