@@ -1,0 +1,77 @@
+"""One hand without the piano: kinematics and dynamics for planners and trackers."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.world.figures import (
+    HAND_ACTUATORS,
+    HAND_JOINTS,
+    LEFT_JOINTS,
+    RIGHT_JOINTS,
+)
+from pianomime.world.model import Side, fingertip_sites, hand_model
+
+SIDES: tuple[Side, Side] = ("lh", "rh")
+"""The sides in plan order (left, right)."""
+
+
+class Hand:
+    """A hand that can be put in any pose.
+
+    Attributes:
+        model: MuJoCo model of the hand alone, read-only.
+        low, high: (27,) joint limits [rad, m].
+        ctrl_low, ctrl_high: (23,) ranges of the actuators [rad, m].
+        gain: (23,) stiffness of the position actuators [N m/rad, N/m].
+        to_ctrl: (23, 27) matrix from joint positions to what the actuators see; the last two
+            joints of each finger hang on one tendon.
+        joints: slice of this hand's joints in the positions (142,) of a World.
+        actuators: slice of this hand's actuators in the controls (46,) of a World.
+    """
+
+    def __init__(self, side: Side) -> None:
+        self.side = side
+        self.model = hand_model(side)
+        self.data = mujoco.MjData(self.model)
+        self.low, self.high = self.model.jnt_range.T.copy()
+        self.ctrl_low, self.ctrl_high = self.model.actuator_ctrlrange.T.copy()
+        self.gain: NDArray[np.float64] = self.model.actuator_gainprm[:, 0].copy()
+        self.to_ctrl = self._transmission()
+        self.joints = RIGHT_JOINTS if side == "rh" else LEFT_JOINTS
+        self.actuators = (
+            slice(0, HAND_ACTUATORS) if side == "rh" else slice(HAND_ACTUATORS, 2 * HAND_ACTUATORS)
+        )
+        self._sites = [self.model.site(name).id for name in fingertip_sites(side)]
+
+    def points(self, qpos: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(6, 3) [m] world positions of wrist and fingertips, thumb first, at joints (27,)."""
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.data)
+        points: NDArray[np.float64] = self.data.site_xpos[self._sites]
+        return points
+
+    def points_and_jacobian(
+        self, qpos: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The points (6, 3) [m] and their Jacobian (6, 3, 27) at joints (27,)."""
+        points = self.points(qpos)
+        mujoco.mj_comPos(self.model, self.data)
+        jacobian = np.empty((len(self._sites), 3, HAND_JOINTS))
+        for row, site in enumerate(self._sites):
+            mujoco.mj_jacSite(self.model, self.data, jacobian[row], None, site)
+        return points, jacobian
+
+    def _transmission(self) -> NDArray[np.float64]:
+        mujoco.mj_forward(self.model, self.data)
+        moment = np.zeros((HAND_ACTUATORS, HAND_JOINTS))
+        mujoco.mju_sparse2dense(
+            moment,
+            self.data.actuator_moment.reshape(-1),
+            self.data.moment_rownnz,
+            self.data.moment_rowadr,
+            self.data.moment_colind.reshape(-1),
+        )
+        return moment
