@@ -108,7 +108,7 @@ def _set_up_rendering(spec: mujoco.MjSpec) -> None:
     visual.quality.shadowsize = 1024
     visual.quality.offsamples = 4
     visual.quality.numslices, visual.quality.numstacks = 20, 10
-    visual.map.znear, visual.map.zfar = 0.05, 10.0
+    visual.map.znear, visual.map.zfar = 0.1, 4.0
     visual.map.shadowclip = 0.8
     visual.headlight.ambient = (0.32, 0.32, 0.34)
     visual.headlight.diffuse = (0.22, 0.22, 0.22)
@@ -130,9 +130,7 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         ("accent_lh", _ACCENT["lh"], 0.3, 0.5),
         ("accent_rh", _ACCENT["rh"], 0.3, 0.5),
     ):
-        spec.add_material(
-            name=name, rgba=(*rgb[:3], 1.0), specular=specular, shininess=shininess
-        )
+        spec.add_material(name=name, rgba=(*rgb[:3], 1.0), specular=specular, shininess=shininess)
 
 
 def _add_stage(spec: mujoco.MjSpec) -> None:
@@ -149,7 +147,7 @@ def _add_stage(spec: mujoco.MjSpec) -> None:
     world.add_light(
         name="key_light",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=(0.5, -0.7, 1.4),
+        pos=(0.8, -1.15, 2.4),
         dir=(-0.30, 0.45, -1.0),
         diffuse=(0.62, 0.60, 0.57),
         specular=(0.45, 0.45, 0.45),
@@ -190,7 +188,7 @@ def _add_cameras(spec: mujoco.MjSpec) -> None:
     for name, pos, target, fovy in (
         ("player", (1.22, 0.0, 1.50), (0.075, 0.0, 0.0), 17.5),
         ("top", (0.10, 0.0, 2.20), (0.0999, 0.0, 0.0), 16.0),
-        ("side", (0.62, 1.15, 0.55), (0.08, 0.12, 0.03), 30.0),
+        ("side", (0.62, 0.80, 0.42), (0.09, 0.06, 0.02), 34.0),
     ):
         assert name in CAMERAS
         spec.worldbody.add_camera(name=name, pos=pos, quat=_look_at(pos, target), fovy=fovy)

@@ -1,0 +1,307 @@
+"""Pictures and films of a performance, drawn with whatever OpenGL the machine has."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cache
+from types import TracebackType
+from typing import Any
+
+import av
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pianomime.files import atomic
+from pianomime.world.figures import KEYS
+from pianomime.world.model import build_spec
+from pianomime.world.scene_look import CAMERAS, dress, key_colours
+
+FILM_SIZE = (1280, 544)
+"""Width and height of a film [pixels]: the keyboard is long."""
+
+_MAX_GEOMS = 1000
+_SILENCED = ("disable", "disabled", "off", "false", "0")
+_PROBE = """
+import importlib, sys, mujoco
+context = importlib.import_module("mujoco." + sys.argv[1]).GLContext(64, 64)
+context.make_current()
+mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
+"""
+_PROBE_SECONDS = 60
+
+
+class RenderUnavailable(RuntimeError):  # noqa: N818 - it tells of the machine, not of a mistake
+    """This machine cannot draw; the message is one line that says what to install."""
+
+
+class Painter:
+    """Draws the world. Use it as a context manager, in the thread that made it.
+
+    Attributes:
+        width, height: size of its pictures [pixels].
+    """
+
+    def __init__(self, width: int, height: int, camera: str = "player") -> None:
+        """Set up a camera.
+
+        Args:
+            width: of the pictures [pixels].
+            height: of the pictures [pixels].
+            camera: one of `pianomime.world.scene_look.CAMERAS`.
+
+        Raises:
+            RenderUnavailable: where there is no working OpenGL.
+            ValueError: for a camera or a size that does not exist.
+        """
+        if camera not in CAMERAS:
+            raise ValueError(f"camera must be one of {', '.join(CAMERAS)}, not {camera}")
+        if width < 1 or height < 1:
+            raise ValueError(f"a picture of {width}x{height} pixels cannot be drawn")
+        backend = _backend()
+        self.width, self.height = width, height
+        self._model = _dressed_model(width, height)
+        self._data = mujoco.MjData(self._model)
+        self._key_geoms = np.array([self._model.geom(f"key_{key}").id for key in range(KEYS)])
+        self._scene = mujoco.MjvScene(self._model, _MAX_GEOMS)
+        # Mirror images double the work, and little here is polished.
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+        self._option = mujoco.MjvOption()
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._camera.fixedcamid = self._model.camera(camera).id
+        self._rectangle = mujoco.MjrRect(0, 0, width, height)
+        # Not `mujoco.Renderer`: it settles on a backend when mujoco is imported, by MUJOCO_GL
+        # alone, and takes one that needs a display where that is not set.
+        self._gl = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
+        self._gl.make_current()
+        self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+
+    def __enter__(self) -> Painter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def paint(self, qpos: ArrayLike, colours: ArrayLike) -> NDArray[np.uint8]:
+        """Draw one frame.
+
+        Args:
+            qpos: (142,) positions: 88 keys, right hand 27, left hand 27 [rad, m].
+            colours: (88, 3) red, green and blue of each key, 0..1.
+
+        Returns:
+            (height, width, 3) uint8.
+        """
+        self._data.qpos[:] = qpos
+        self._model.geom_rgba[self._key_geoms, :3] = colours
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        mujoco.mjv_updateScene(
+            self._model,
+            self._data,
+            self._option,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL,
+            self._scene,
+        )
+        self._gl.make_current()
+        mujoco.mjr_render(self._rectangle, self._scene, self._context)
+        picture = np.empty((self.height, self.width, 3), np.uint8)
+        mujoco.mjr_readPixels(picture, None, self._rectangle, self._context)
+        return picture[::-1]  # OpenGL counts rows from below
+
+    def close(self) -> None:
+        """Give back what the graphics driver holds."""
+        self._gl.make_current()
+        self._context.free()
+        self._gl.free()
+
+
+def render_frame(
+    qpos: ArrayLike,
+    pressed: NDArray[np.bool_],
+    width: int = 1920,
+    height: int = 816,
+    camera: str = "player",
+) -> NDArray[np.uint8]:
+    """Draw one picture.
+
+    Args:
+        qpos: (142,) positions: 88 keys, right hand 27, left hand 27 [rad, m].
+        pressed: (88,) bool, the keys to show as pressed.
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+        camera: one of `pianomime.world.scene_look.CAMERAS`.
+
+    Returns:
+        (height, width, 3) uint8.
+
+    Raises:
+        RenderUnavailable: where there is no working OpenGL.
+    """
+    with Painter(width, height, camera) as painter:
+        return painter.paint(qpos, key_colours(pressed))
+
+
+def write_video(
+    path: str | os.PathLike[str],
+    qpos: NDArray[np.float64],
+    pressed: NDArray[np.bool_],
+    audio: NDArray[np.float32] | None,
+    sample_rate: int = 44100,
+    fps: int = 20,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    colours: NDArray[np.float32] | None = None,
+    size: tuple[int, int] = FILM_SIZE,
+    camera: str = "player",
+) -> None:
+    """Film a performance: one picture a frame, and its sound, as MP4 (H.264, AAC).
+
+    The film ends with the last frame; sound that rings on is cut there. Frames are encoded as
+    they are drawn, so memory does not grow with the song.
+
+    Args:
+        path: where to; appears only when complete.
+        qpos: (T, 142) positions: 88 keys, right hand 27, left hand 27 [rad, m].
+        pressed: (T, 88) bool, the keys to show as pressed.
+        audio: (S, 2) sound, -1..1, or None for a silent film.
+        sample_rate: of the sound [Hz].
+        fps: frames a second: 20 shows a performance at its own speed.
+        progress: told (frames done, frames in all) after every frame.
+        colours: (T, 88, 3) colours of the keys, 0..1, instead of those that `pressed` gives.
+        size: width and height [pixels], both even.
+        camera: one of `pianomime.world.scene_look.CAMERAS`.
+
+    Raises:
+        RenderUnavailable: where there is no working OpenGL.
+        ValueError: if the shapes do not fit together.
+    """
+    frames = len(qpos)
+    if not frames:
+        raise ValueError("a performance without frames cannot be filmed")
+    if pressed.shape != (frames, KEYS):
+        raise ValueError(f"pressed must be ({frames}, {KEYS}), not {pressed.shape}")
+    if colours is not None and colours.shape != (frames, KEYS, 3):
+        raise ValueError(f"colours must be ({frames}, {KEYS}, 3), not {colours.shape}")
+    if audio is not None and (audio.ndim != 2 or audio.shape[1] != 2):
+        raise ValueError(f"audio must be (S, 2), not {audio.shape}")
+    if size[0] % 2 or size[1] % 2:
+        raise ValueError(f"H.264 films have even sizes, not {size[0]}x{size[1]}")
+    with (
+        Painter(*size, camera) as painter,
+        atomic(path) as temporary,
+        # An index at the front lets a browser start before it has the whole film.
+        av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as film,
+    ):
+        picture_stream: Any = film.add_stream("libx264", rate=fps)
+        picture_stream.width, picture_stream.height = size
+        picture_stream.pix_fmt = "yuv420p"
+        picture_stream.options = {"crf": "20", "preset": "veryfast"}
+        sound_stream: Any = None
+        if audio is not None:
+            sound_stream = film.add_stream("aac", rate=sample_rate, layout="stereo")
+        for frame in range(frames):
+            shown = key_colours(pressed[frame]) if colours is None else colours[frame]
+            picture = av.VideoFrame.from_ndarray(
+                np.ascontiguousarray(painter.paint(qpos[frame], shown)), format="rgb24"
+            )
+            picture.pts, picture.time_base = frame, Fraction(1, fps)
+            film.mux(picture_stream.encode(picture))
+            if audio is not None:
+                # A frame's sound right after its picture keeps the two together in the file.
+                start, end = (round(at * sample_rate / fps) for at in (frame, frame + 1))
+                film.mux(sound_stream.encode(_sound(audio, start, end, sample_rate)))
+            if progress is not None:
+                progress(frame + 1, frames)
+        for stream in (picture_stream, sound_stream):
+            if stream is not None:
+                film.mux(stream.encode(None))
+
+
+def _sound(audio: NDArray[np.float32], start: int, end: int, sample_rate: int) -> av.AudioFrame:
+    """The samples start..end as a frame to encode, with silence after the end of the sound."""
+    samples = np.zeros((2, end - start), np.float32)
+    there = audio[start:end].T
+    samples[:, : there.shape[1]] = there
+    sound = av.AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
+    sound.sample_rate = sample_rate
+    sound.pts, sound.time_base = start, Fraction(1, sample_rate)
+    return sound
+
+
+def _dressed_model(width: int, height: int) -> mujoco.MjModel:
+    """A model to draw, not to simulate: its key colours change from frame to frame."""
+    spec = build_spec()
+    dress(spec)
+    # The buffer is allocated and cleared at this size, however small the picture.
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
+    return spec.compile()
+
+
+@cache
+def _backend() -> str:
+    """The module of `mujoco` whose GLContext works here without a display.
+
+    Raises:
+        RenderUnavailable: if none does.
+    """
+    wanted = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if wanted in _SILENCED:
+        raise RenderUnavailable(f"no film: rendering is switched off by MUJOCO_GL={wanted}")
+    chosen = wanted in _candidates()
+    for backend in (wanted,) if chosen else _candidates():
+        if _works(backend):
+            return backend
+    if chosen:
+        raise RenderUnavailable(
+            f"no film: MUJOCO_GL={wanted} does not work here; unset it, or install what it needs"
+        )
+    raise RenderUnavailable(_advice())
+
+
+def _candidates() -> tuple[str, ...]:
+    if sys.platform == "darwin":
+        return ("cgl", "glfw")
+    if sys.platform == "win32":
+        return ("glfw",)
+    return ("egl", "osmesa", "glfw")
+
+
+def _works(backend: str) -> bool:
+    """Try a backend in a process of its own: a broken driver can take its process down."""
+    try:
+        probe = subprocess.run(
+            [sys.executable, "-c", _PROBE, backend],
+            # A name it does not know makes mujoco itself fail to import.
+            env={**os.environ, "MUJOCO_GL": backend},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=_PROBE_SECONDS,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return probe.returncode == 0
+
+
+def _advice() -> str:
+    if sys.platform == "linux":
+        return (
+            "no film: there is no working OpenGL here; on Debian or Ubuntu install it with "
+            "`apt-get install libegl1 libgl1`"
+        )
+    return "no film: there is no working OpenGL here; install a graphics driver"
