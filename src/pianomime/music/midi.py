@@ -23,9 +23,11 @@ SUSTAIN_PEDAL = 64
 PEDAL_DOWN = 64
 """Control number of the sustain pedal, and the lowest value at which it is down."""
 
-WRITTEN_TICKS_PER_BEAT = 960
+WRITTEN_TICKS_PER_BEAT = 7680
 WRITTEN_BEATS_PER_MINUTE = 120
-"""A frame of 0.05 s is 96 ticks: rolls survive writing and reading."""
+"""A frame of 0.05 s is 768 ticks, a power of two times the usual 48, so that the grid survives the
+rounding of floats and rolls come back from a file cell for cell. It is also fine enough for other
+times, and coarse enough that a silence as long as the longest score fits in MIDI's 28 bits."""
 
 
 def read_midi(path: Path) -> Score:

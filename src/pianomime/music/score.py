@@ -14,8 +14,8 @@ KEYS = 88
 LOWEST_PITCH = 21
 """MIDI pitch of key 0, the A at the bass end of the keyboard."""
 
-MAX_SECONDS = 24 * 3600.0
-"""Longest score. A damaged MIDI file can claim years; its roll would not fit in memory."""
+MAX_SECONDS = 4 * 3600.0
+"""Longest score. A damaged MIDI file can claim years, and its roll would not fit in memory."""
 
 
 class ScoreError(ValueError):
@@ -91,7 +91,7 @@ class Score:
         return read_midi(Path(path))
 
     def to_midi(self, path: str | os.PathLike[str]) -> None:
-        """Write a MIDI file with one piano track; times are rounded to 1/1920 s.
+        """Write a MIDI file with one piano track; times are rounded to 1/15360 s.
 
         Times on the 0.05 s grid, and so rolls, come back from `from_midi` unchanged.
 
@@ -187,9 +187,9 @@ class Score:
         ended. The frames of two notes on one key never overlap, and all together are the roll.
 
         Returns:
-            (N, 2) int64: first frame, and one past the last. Both are equal for a note that is
-            struck again before it could be heard (within its first frame, or in each of two
-            frames in a row): it has no frame of its own.
+            (N, 2) int64: first frame, and one past the last. They are equal for a note that has
+            no frame of its own: its key is struck again before it could come up and go down
+            (within the frame or in the next), or the piece ends before that.
         """
         rate = _rate(dt)
         # Plain rounding of floating-point products, without tolerance: only so are the rolls
@@ -218,7 +218,7 @@ class Score:
             spans.append([first, max(held, first + 1)])
         frames = np.empty((len(self), 2), np.int64)
         frames[order] = np.reshape(np.array(spans, np.int64), (-1, 2))
-        return frames
+        return np.minimum(frames, self.frames(dt))
 
     def roll(self, dt: float = 0.05) -> NDArray[np.bool_]:
         """Which keys are down in each frame, see `note_frames`.
@@ -230,8 +230,7 @@ class Score:
             (T, 88) bool, T as in `frames`.
         """
         spans = self.note_frames(dt)
-        # A short note at the very end, struck again, may need one frame more than the rule gives.
-        down = np.zeros((max(self.frames(dt), int(spans.max(initial=0))), KEYS), bool)
+        down = np.zeros((self.frames(dt), KEYS), bool)
         for key, (first, stop) in zip(self.key.tolist(), spans.tolist(), strict=True):
             down[first:stop, key] = True
         return down
@@ -239,11 +238,14 @@ class Score:
     def pedal_roll(self, dt: float = 0.05) -> NDArray[np.bool_]:
         """Whether the sustain pedal is down in each frame: its state when the frame ends.
 
+        A pedal still down when the last note ends stays down to the last frame.
+
         Returns:
             (T,) bool, one entry for each frame of `roll`.
         """
         spans = np.floor(self.pedal * _rate(dt)).astype(np.int64)
-        down = np.zeros(len(self.roll(dt)), bool)
+        down = np.zeros(self.frames(dt), bool)
+        spans[self.pedal[:, 1] >= self.duration, 1] = len(down)
         for first, stop in spans.tolist():
             down[first:stop] = True
         return down
