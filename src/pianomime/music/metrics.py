@@ -102,8 +102,10 @@ def _by_key(key: ArrayLike, onset: ArrayLike) -> tuple[list[int], list[float]]:
 
 def _ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
     """Part / whole, with 0 / 0 = 1."""
-    part, whole = np.asarray(part, np.float64), np.asarray(whole, np.float64)
-    return np.divide(part, whole, out=np.ones_like(whole), where=whole > 0)
+    whole = np.asarray(whole, np.float64)
+    ratio = np.ones_like(whole)
+    np.divide(part, whole, out=ratio, where=whole > 0)
+    return ratio
 
 
 def _same_shape(
