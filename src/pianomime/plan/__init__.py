@@ -2,5 +2,16 @@
 
 from pianomime.plan.fingertip_plan import FINGERS, LEFT, NO_KEY, POINTS, RIGHT, FingertipPlan
 from pianomime.plan.planner import Planner
+from pianomime.plan.zero_shot import ZeroShotConfig, ZeroShotPlanner
 
-__all__ = ["FINGERS", "LEFT", "NO_KEY", "POINTS", "RIGHT", "FingertipPlan", "Planner"]
+__all__ = [
+    "FINGERS",
+    "LEFT",
+    "NO_KEY",
+    "POINTS",
+    "RIGHT",
+    "FingertipPlan",
+    "Planner",
+    "ZeroShotConfig",
+    "ZeroShotPlanner",
+]

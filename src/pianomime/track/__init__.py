@@ -1,6 +1,7 @@
 """Trackers: from a FingertipPlan to controls."""
 
+from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
 from pianomime.track.tracker import Tracker
 
-__all__ = ["IkConfig", "IkTracker", "Tracker"]
+__all__ = ["DynamicConfig", "DynamicTracker", "IkConfig", "IkTracker", "Tracker"]

@@ -1,0 +1,227 @@
+"""Which finger of which hand plays each note: a search over onsets for both hands at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.music import Score
+from pianomime.plan.fingertip_plan import LEFT, RIGHT
+from pianomime.world.figures import BLACK, CONTROL_DT, key_centres
+
+_FINGERS = 5
+# Where the fingers of a right hand lie along the keyboard when it is at ease, thumb first [m].
+_EASE = np.array([-0.062, -0.024, 0.0, 0.023, 0.046])
+# How far from there each one is played without effort [m].
+_SPREAD = np.array([0.022, 0.014, 0.014, 0.014, 0.018])
+# And how far at most.
+_REACH = np.array([0.065, 0.040, 0.040, 0.040, 0.048])
+
+
+@dataclass(frozen=True)
+class FingeringConfig:
+    """Costs of the search; 1 is a small inconvenience."""
+
+    beam: int = 40
+    """Partial fingerings kept at each onset."""
+    drop: float = 12.0
+    """For a note that no finger plays, and"""
+    drop_frame: float = 0.5
+    """for each frame that it would have sounded."""
+    travel_speed: float = 0.5
+    """[m/s] of a hand that costs 1 (it grows with the square)."""
+    hop_speed: float = 0.25
+    """[m/s] of a finger from key to key, relative to its hand, that costs 1."""
+    thumb_on_black: float = 0.8
+    weak_finger: float = 0.3
+    """For ring and little finger on any note."""
+    crossed: float = 3.0
+    """For hands nearer than `apart`."""
+    apart: float = 0.10
+    """[m] between the middle fingers of the two hands."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fingering:
+    """Attributes: hand (N,) int8 0 left, 1 right, -1 not played; finger (N,) int8 0 thumb .. 4."""
+
+    hand: NDArray[np.int8]
+    finger: NDArray[np.int8]
+
+
+def find_fingering(score: Score, config: FingeringConfig | None = None) -> Fingering:
+    """Search the cheapest fingering, onset by onset, keeping the best partial ones.
+
+    A note is left out where no finger is free for it within reach, or where reaching it costs
+    more than leaving it out; of more than ten notes struck at once the inner ones go first.
+    """
+    config = config or FingeringConfig()
+    hand = np.full(len(score), -1, np.int8)
+    finger = np.full(len(score), -1, np.int8)
+    if not len(score):
+        return Fingering(hand, finger)
+    frames = score.note_frames()
+    beam = _Beam.start()
+    history = []
+    onsets, event = np.unique(frames[:, 0], return_inverse=True)
+    groups = np.split(np.argsort(event, kind="stable"), np.cumsum(np.bincount(event))[:-1])
+    for onset, group in zip(onsets, groups, strict=True):
+        # Two voices may strike the same key at once: one finger plays both.
+        keys, voice = np.unique(score.key[group], return_inverse=True)
+        ends = np.zeros(len(keys), np.int64)
+        np.maximum.at(ends, voice, frames[group, 1])
+        outer = np.ones(len(keys), bool)
+        outer[_FINGERS : len(keys) - _FINGERS] = False
+        beam, parent, assignment = beam.extend(int(onset), keys[outer], ends[outer], config)
+        place = np.where(outer, np.cumsum(outer) - 1, -1)[voice]
+        history.append((group, place, parent, assignment))
+    best = int(np.argmin(beam.cost))
+    for group, place, parent, assignment in reversed(history):
+        choice = np.where(place >= 0, assignment[best][place], -1)
+        played = group[choice >= 0]
+        hand[played], finger[played] = np.divmod(choice[choice >= 0], _FINGERS)
+        best = int(parent[best])
+    return Fingering(hand, finger)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beam:
+    """B partial fingerings: what each of ten fingers last played, and where the hands are."""
+
+    cost: NDArray[np.float64]  # (B,)
+    key: NDArray[np.int64]  # (B, 2, 5) last key of each finger, -1 none yet
+    until: NDArray[np.int64]  # (B, 2, 5) first frame in which the finger is free again
+    centre: NDArray[np.float64]  # (B, 2) [m] where the middle finger is at ease
+
+    @staticmethod
+    def start() -> _Beam:
+        return _Beam(
+            np.zeros(1),
+            np.full((1, 2, _FINGERS), -1),
+            np.zeros((1, 2, _FINGERS), np.int64),
+            np.array([[-0.14, 0.14]]),
+        )
+
+    def extend(
+        self,
+        onset: int,
+        keys: NDArray[np.int64],
+        ends: NDArray[np.int64],
+        config: FingeringConfig,
+    ) -> tuple[_Beam, NDArray[np.int64], NDArray[np.int8]]:
+        """Every way to play the notes struck at `onset`; the best few are kept.
+
+        Returns the new beam, for each of its rows the row it came from, and the finger of each
+        note (B, M): 0..4 left thumb to little, 5..9 right, -1 not played.
+        """
+        options, pairs = _options(len(keys))
+        sides = [
+            self._hand_cost(side, onset, keys, options, config) for side in (LEFT, RIGHT)
+        ]
+        (left, left_centre), (right, right_centre) = sides
+        played = (options[pairs[:, 0]] >= 0) | (options[pairs[:, 1]] >= 0)
+        dropped = ~played @ (config.drop + config.drop_frame * (ends - onset))
+        total = self.cost[:, None] + left[:, pairs[:, 0]] + right[:, pairs[:, 1]] + dropped
+        near = right_centre[:, pairs[:, 1]] - left_centre[:, pairs[:, 0]] < config.apart
+        total += config.crossed * near
+        keep = min(config.beam, total.size)
+        chosen = np.argpartition(total.ravel(), keep - 1)[:keep]
+        parent, pair = np.unravel_index(chosen, total.shape)
+        left_option, right_option = pairs[pair].T
+        assignment = np.where(
+            options[left_option] >= 0,
+            options[left_option],
+            np.where(options[right_option] >= 0, options[right_option] + _FINGERS, -1),
+        ).astype(np.int8)
+        key, until = self.key[parent].copy(), self.until[parent].copy()
+        row, note = np.nonzero(assignment >= 0)
+        side, finger = np.divmod(assignment[row, note], _FINGERS)
+        key[row, side, finger] = keys[note]
+        until[row, side, finger] = ends[note]
+        centre = np.stack(
+            [left_centre[parent, left_option], right_centre[parent, right_option]], axis=1
+        )
+        return _Beam(total[parent, pair], key, until, centre), parent, assignment
+
+    def _hand_cost(
+        self,
+        side: int,
+        onset: int,
+        keys: NDArray[np.int64],
+        options: NDArray[np.int64],
+        config: FingeringConfig,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Cost (B, O) of each option for one hand, and where the hand then is (B, O) [m]."""
+        along = key_centres()[:, 1]
+        ease = _EASE if side == RIGHT else -_EASE
+        last, until = self.key[:, side], self.until[:, side]
+        # (O, 5): the key each finger is to strike, -1 none.
+        strikes = np.full((len(options), _FINGERS), -1)
+        option, note = np.nonzero(options >= 0)
+        strikes[option, options[option, note]] = keys[note]
+        struck = strikes >= 0
+        held = until > onset
+        # (B, O, 5): what each finger is on once the notes are struck.
+        busy = struck[None] | held[:, None]
+        clash = (struck[None] & held[:, None]).any(axis=2)
+        at = along[np.where(struck[None], strikes[None], last[:, None])]
+        count = busy.sum(axis=2)
+        wish = np.where(busy, at - ease, 0.0).sum(axis=2) / np.maximum(count, 1)
+        centre = np.where(count > 0, wish, self.centre[:, None, side])
+        # A hand need not follow exactly: it moves as little as leaves every finger at ease.
+        before = self.centre[:, None, side]
+        stray = np.where(busy, at - ease - centre[..., None], 0.0)
+        cost = ((stray / _SPREAD) ** 2).sum(axis=2)
+        cost += np.where((np.abs(stray) > _REACH).any(axis=2), 50.0, 0.0)
+        # Travel: the hand can leave when the last of its released fingers has come up.
+        free_since = np.where(held, 0, until).max(axis=1)
+        seconds = (np.maximum(onset - free_since, 0) + 1) * CONTROL_DT
+        travel = np.abs(centre - before)
+        strikes_any = struck.any(axis=1)
+        cost += np.where(
+            strikes_any[None], (travel / seconds[:, None] / config.travel_speed) ** 2, 0.0
+        )
+        # Hop: a finger that goes to another key, on top of what the hand carries it.
+        idle = (np.maximum(onset - until, 0) + 1) * CONTROL_DT
+        moved = np.where(
+            struck[None] & (last[:, None] >= 0) & (strikes[None] != last[:, None]),
+            np.abs(along[strikes[None]] - along[last[:, None]] - (centre - before)[..., None])
+            + 0.01,
+            0.0,
+        )
+        cost += ((moved / idle[:, None] / config.hop_speed) ** 2).sum(axis=2)
+        comfort = config.weak_finger * struck[:, 3:].sum(axis=1)
+        comfort = comfort + config.thumb_on_black * (struck[:, 0] & BLACK[strikes[:, 0]])
+        cost += comfort
+        return np.where(clash, np.inf, cost), centre
+
+
+@cache
+def _options(notes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Ways to play `notes` keys struck together, low to high.
+
+    Returns:
+        options (O, notes): the finger 0..4 of one hand on each note, -1 for none; and
+        pairs (P, 2): which options of the left and the right hand go together. Fingers keep
+        their order along the keyboard; at most two notes are left out.
+    """
+    rows: dict[tuple[int, ...], int] = {}
+    pairs = []
+    # Ten fingers from bass to treble: left little .. left thumb, right thumb .. right little.
+    left = [4, 3, 2, 1, 0]
+    most_dropped = 2 if notes <= 4 else 1
+    for played in range(max(0, notes - most_dropped), min(notes, 2 * _FINGERS) + 1):
+        for which in combinations(range(notes), played):
+            for places in combinations(range(2 * _FINGERS), played):
+                mine = np.full((2, notes), -1)
+                for note, place in zip(which, places, strict=True):
+                    if place < _FINGERS:
+                        mine[LEFT, note] = left[place]
+                    else:
+                        mine[RIGHT, note] = place - _FINGERS
+                pairs.append([rows.setdefault(tuple(half), len(rows)) for half in mine])
+    return np.array(list(rows), np.int64).reshape(-1, notes), np.array(pairs)

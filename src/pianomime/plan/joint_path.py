@@ -1,0 +1,187 @@
+"""A smooth path of joint positions that leads fingertips through their targets.
+
+Inverse kinematics over a whole piece at once: every frame sees what comes later, so a hand sets
+off for a leap in time, and fingers that do not play stay out of the way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+
+from pianomime.world.figures import CONTROL_DT, HAND_JOINTS, key_centres, key_half_sizes
+from pianomime.world.hand import Hand
+
+HOME = np.array(
+    [0.0, 0.0, -0.01, -0.1, -0.05]
+    + [0.0, 0.83, 0.65, 0.65]
+    + [0.0, 0.79, 0.61, 0.61]
+    + [0.0, 0.76, 0.57, 0.57]
+    + [0.05, 0.0, 0.74, 0.55, 0.55]
+    + [0.13, 0.84, 0.0, 0.0, 0.2]
+)
+"""(27,) joint positions of a hand curved over the keys, for either hand [rad, m]."""
+
+TIP_RADIUS = 0.0085
+"""[m] From a fingertip's site to where it touches a key."""
+WHITE_REST, BLACK_REST = (
+    float(key_centres()[key, 2] + key_half_sizes()[key, 2]) + TIP_RADIUS for key in (0, 1)
+)
+"""[m] Height of a fingertip's site when it rests on a white or a black key."""
+
+# Joints 2 and 1 of each finger hang on one tendon and turn together when nothing touches them.
+_COUPLED = [(7, 8), (11, 12), (15, 16), (20, 21)]
+
+
+@dataclass(frozen=True)
+class PathConfig:
+    """How a path weighs its wishes; each weight is one over a deviation that counts as 1."""
+
+    slide_acceleration: float = 40.0
+    """[m/s^2] of the forearm."""
+    joint_acceleration: float = 400.0
+    """[rad/s^2] of wrist and fingers."""
+    posture: float = 0.8
+    """[rad] away from the home pose."""
+    slide_posture: float = 0.1
+    """[m] of the forearm toward and away from the piano."""
+    coupling: float = 0.15
+    """[rad] between the two end joints of a finger."""
+    floor: float = 0.002
+    """[m] below the floor that keeps idle fingertips off the keys."""
+    limit: float = 0.02
+    """[rad, m] beyond a joint limit."""
+    iterations: int = 8
+    """Gauss-Newton steps."""
+
+
+def smooth_path(
+    hand: Hand,
+    start: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    clearance: NDArray[np.float64],
+    config: PathConfig | None = None,
+) -> NDArray[np.float64]:
+    """Joint positions at the end of each of T frames.
+
+    Args:
+        hand: whose path.
+        start: (27,) joint positions before the first frame, where the hand rests.
+        targets: (T, 6, 3) [m] where wrist and fingertips should be at the end of each frame.
+        weights: (T, 6, 3) [1/m] one over the deviation from the target that counts as 1.
+        clearance: (T, 5) [m] how far above the keys a fingertip should stay; nan for fingers
+            that may go down.
+        config: the other weights.
+
+    Returns:
+        (T + 1, 27) joint positions [rad, m]; the first row is `start`.
+    """
+    config = config or PathConfig()
+    frames = len(targets)
+    posture = _posture_weights(config)
+    coupling = _coupling_hessian(config)
+    stiffness = _acceleration_weights(config)
+    home = np.clip(HOME, hand.low, hand.high)
+    path = np.tile(home, (frames, 1))
+    path[:, 0] = _slide_guess(hand, targets)
+    damping = 1e-3
+    for _ in range(config.iterations):
+        gradient = np.empty((frames, HAND_JOINTS))
+        blocks = np.empty((frames, HAND_JOINTS, HAND_JOINTS))
+        for frame in range(frames):
+            points, jacobian = hand.points_and_jacobian(path[frame])
+            error = (points - targets[frame]) * weights[frame]
+            rows = jacobian * weights[frame][..., None]
+            lack = points[1:, 2] - clearance[frame] - resting_height(points[1:, 0])
+            below = lack < 0.0
+            error[1:, 2][below] = lack[below] / config.floor
+            rows[1:, 2][below] = jacobian[1:, 2][below] / config.floor
+            rows = rows.reshape(-1, HAND_JOINTS)
+            blocks[frame] = rows.T @ rows
+            gradient[frame] = rows.T @ error.ravel()
+        beyond = np.minimum(path - hand.low, 0.0) + np.maximum(path - hand.high, 0.0)
+        hit = (beyond != 0.0) / config.limit**2
+        gradient += posture * (path - home) + path @ coupling + hit * beyond
+        blocks += np.diag(posture + damping) + coupling
+        blocks[:, np.arange(HAND_JOINTS), np.arange(HAND_JOINTS)] += hit
+        path += _step(blocks, gradient, stiffness, path, start)
+    return np.vstack([start, np.clip(path, hand.low, hand.high)])
+
+
+def resting_height(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Height [m] of a fingertip's site when it rests on the keys at `x` [m].
+
+    The black keys' tops count wherever a fingertip could touch one.
+    """
+    onto_black = np.clip((0.03 - x) / 0.01, 0.0, 1.0)
+    return WHITE_REST + (BLACK_REST - WHITE_REST) * onto_black
+
+
+def _posture_weights(config: PathConfig) -> NDArray[np.float64]:
+    weights = np.full(HAND_JOINTS, config.posture**-2)
+    weights[0] = 0.0
+    weights[1:3] = config.slide_posture**-2
+    return weights
+
+
+def _coupling_hessian(config: PathConfig) -> NDArray[np.float64]:
+    hessian = np.zeros((HAND_JOINTS, HAND_JOINTS))
+    for one, other in _COUPLED:
+        pair = np.ix_([one, other], [one, other])
+        hessian[pair] += np.array([[1.0, -1.0], [-1.0, 1.0]]) / config.coupling**2
+    return hessian
+
+
+def _slide_guess(hand: Hand, targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Forearms start over the middle of their fingers' targets."""
+    rest = hand.points(np.zeros(HAND_JOINTS))
+    along: NDArray[np.float64] = (targets[:, 1:, 1] - rest[1:, 1]).mean(axis=1)
+    return along
+
+
+def _acceleration_weights(config: PathConfig) -> NDArray[np.float64]:
+    scale = np.full(HAND_JOINTS, config.joint_acceleration)
+    scale[:3] = config.slide_acceleration
+    weights: NDArray[np.float64] = (scale * CONTROL_DT**2) ** -2
+    return weights
+
+
+def _step(
+    blocks: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    stiffness: NDArray[np.float64],
+    path: NDArray[np.float64],
+    start: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The Gauss-Newton step (T, 27): frames are tied together by their second differences.
+
+    Each joint's second differences tie it to itself two frames away, so that the matrix has a
+    band of 2 x 27 below its diagonal.
+    """
+    frames = len(path)
+    # The hand sets off from rest: before the first frame it is at the start, twice.
+    second = np.diff(np.vstack([start, start, path]), n=2, axis=0)
+    second = np.vstack([second, np.zeros((2, HAND_JOINTS))])
+    gradient = gradient + stiffness * (second[:-2] - 2.0 * second[1:-1] + second[2:])
+    band = np.zeros((2 * HAND_JOINTS + 1, frames, HAND_JOINTS))
+    for below in range(HAND_JOINTS):
+        column = np.arange(HAND_JOINTS - below)
+        band[below][:, column] = blocks[:, column + below, column]
+    ties = np.full((3, frames, 1), [[[6.0]], [[-4.0]], [[1.0]]])
+    ties[0, -2:, 0] = 5.0, 1.0
+    ties[1, -2:, 0] = -2.0, 0.0
+    ties[2, -2:, 0] = 0.0
+    for lag in range(3):
+        band[lag * HAND_JOINTS] += ties[lag] * stiffness
+    step = solveh_banded(
+        band.reshape(2 * HAND_JOINTS + 1, -1),
+        -gradient.ravel(),
+        lower=True,
+        overwrite_ab=True,
+        check_finite=False,
+    )
+    return step.reshape(frames, HAND_JOINTS)

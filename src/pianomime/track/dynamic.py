@@ -1,0 +1,120 @@
+"""The dynamic tracker: smooth inverse kinematics, inverse dynamics and a press force.
+
+Position actuators are slow: the forearm takes a quarter of a second to arrive. So what is sent
+is not the wanted joint position but the one whose spring gives the torque that the wanted motion
+needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.plan import FingertipPlan
+from pianomime.plan.joint_path import BLACK_REST, WHITE_REST, PathConfig, smooth_path
+from pianomime.world import World
+from pianomime.world.figures import BLACK, CONTROL_DT
+from pianomime.world.hand import SIDES, Hand
+
+
+@dataclass(frozen=True)
+class DynamicConfig:
+    """The dynamic tracker."""
+
+    path: PathConfig = field(default_factory=PathConfig)
+    depth: float = 0.009
+    """[m] below the resting key's top that a pressing fingertip aims."""
+    force: float = 2.0
+    """[N] downward on a pressed key."""
+    feedback: float = 0.5
+    """Share of the joint error that is added to the control."""
+
+
+class DynamicTracker:
+    """Follows any fingertip plan, a planner's or a human's."""
+
+    def __init__(self, config: DynamicConfig | None = None) -> None:
+        self.config = config or DynamicConfig()
+        self._hands = [Hand(side) for side in SIDES]
+
+    def begin(self, plan: FingertipPlan) -> None:
+        """Work out the joint paths and the controls that follow them, from the rest pose."""
+        start = World().qpos
+        self._paths = []
+        self._feedforward = np.empty((len(plan), 46))
+        for index, hand in enumerate(self._hands):
+            pressing = plan.finger_key[:, index] >= 0
+            targets, weights = self._wishes(plan.fingertips[:, index], plan.finger_key[:, index])
+            clearance = np.full(pressing.shape, np.nan)
+            path = smooth_path(
+                hand, start[hand.joints], targets, weights, clearance, self.config.path
+            )
+            self._paths.append(path)
+            torque = motion_torque(hand, path)
+            torque += self.config.force * press_torque(hand, path[1:], pressing)
+            middle = (path[1:] + path[:-1]) / 2
+            ctrl = middle @ hand.to_ctrl.T + to_actuators(hand, torque) / hand.gain
+            self._feedforward[:, hand.actuators] = np.clip(ctrl, hand.ctrl_low, hand.ctrl_high)
+
+    def control(self, frame: int, world: World) -> NDArray[np.float64]:
+        """(46,) right then left: feed-forward plus a share of the present joint error."""
+        ctrl = self._feedforward[frame].copy()
+        qpos = world.qpos
+        for hand, path in zip(self._hands, self._paths, strict=True):
+            error = hand.to_ctrl @ (path[frame] - qpos[hand.joints])
+            ctrl[hand.actuators] += self.config.feedback * error
+        return ctrl
+
+    def _wishes(
+        self, points: NDArray[np.float64], finger_key: NDArray[np.int8]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        targets = points.copy()
+        weights = np.empty_like(points)
+        weights[:, 0] = [0.0, 1 / 0.05, 0.0]
+        weights[:, 1:] = 1 / 0.004
+        pressing = finger_key >= 0
+        rest = np.where(BLACK, BLACK_REST, WHITE_REST)
+        targets[:, 1:, 2][pressing] = rest[finger_key[pressing]] - self.config.depth
+        weights[:, 1:][pressing] = 1 / np.array([0.004, 0.0015, 0.001])
+        return targets, weights
+
+
+def motion_torque(hand: Hand, path: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, 27) [N m, N] torque that moves a hand along a path (T + 1, 27), without contacts.
+
+    For each control step: at its middle, with the accelerations of its two ends averaged.
+    """
+    middle = (path[1:] + path[:-1]) / 2
+    velocity = np.diff(path, axis=0) / CONTROL_DT
+    padded = np.vstack([np.zeros_like(velocity[:1]), velocity, velocity[-1:]])
+    acceleration = (padded[2:] - padded[:-2]) / (2 * CONTROL_DT)
+    torque = np.empty_like(middle)
+    data = mujoco.MjData(hand.model)
+    for step in range(len(middle)):
+        data.qpos[:], data.qvel[:] = middle[step], velocity[step]
+        data.qacc[:] = acceleration[step]
+        mujoco.mj_fwdPosition(hand.model, data)
+        mujoco.mj_fwdVelocity(hand.model, data)
+        mujoco.mj_rne(hand.model, data, 1, torque[step])
+        torque[step] += hand.model.dof_armature * acceleration[step] - data.qfrc_passive
+    return torque
+
+
+def press_torque(
+    hand: Hand, path: NDArray[np.float64], pressing: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """(T, 27) [N m, N] torque that pushes pressing fingertips (T, 5) down with 1 N each."""
+    torque = np.zeros_like(path)
+    for frame in np.flatnonzero(pressing.any(axis=1)):
+        _, jacobian = hand.points_and_jacobian(path[frame])
+        torque[frame] = -jacobian[1:, 2][pressing[frame]].sum(axis=0)
+    return torque
+
+
+def to_actuators(hand: Hand, torque: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Forces (T, 23) of the actuators that come nearest joint torques (T, 27)."""
+    forces: NDArray[np.float64] = torque @ np.linalg.pinv(hand.to_ctrl)
+    return forces
