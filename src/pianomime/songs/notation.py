@@ -89,10 +89,10 @@ def to_score(song: Song) -> Score:
 def _events(song: Song, text: str, unit: float) -> list[tuple[list[str], float, float]]:
     """What sounds in one line: names, start and length, both in beats."""
     events = []
-    now, bar_end = 0.0, song.upbeat or song.bar
+    start, now, bar_end = 0.0, 0.0, song.upbeat or song.bar
     for token in text.split():
         if token == "|":
-            if now < bar_end or (now - bar_end) % song.bar:
+            if now < bar_end or start >= bar_end or (now - bar_end) % song.bar:
                 raise ScoreError(f"{song.title}: bar ends at beat {now}, not {bar_end}")
             bar_end = now + song.bar
             continue
@@ -100,7 +100,7 @@ def _events(song: Song, text: str, unit: float) -> list[tuple[list[str], float, 
         beats = float(length) if length else unit
         if name != "r":
             events.append((name.split("+"), now, beats))
-        now += beats
+        start, now = now, now + beats
     return events
 
 

@@ -1,0 +1,65 @@
+"""The bundled songs and their notation."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pianomime import songs
+from pianomime.music import Score, ScoreError
+from pianomime.songs.notation import SONGS, Song, Voice, to_score
+
+
+def test_names_and_paths() -> None:
+    assert songs.names() == sorted(SONGS)
+    assert len(songs.names()) >= 6
+    assert all(songs.path(name).is_file() for name in songs.names())
+    with pytest.raises(ScoreError, match=r"no bundled song 'smoke'; there are bach"):
+        songs.path("smoke")
+
+
+@pytest.mark.parametrize("name", sorted(SONGS))
+def test_files_are_what_the_notation_says(name: str, tmp_path: Path) -> None:
+    to_score(SONGS[name]).to_midi(tmp_path / "song.mid")
+    assert (tmp_path / "song.mid").read_bytes() == songs.path(name).read_bytes()
+
+
+@pytest.mark.parametrize("name", sorted(SONGS))
+def test_songs_can_be_played_by_ten_fingers(name: str) -> None:
+    score = Score.from_midi(songs.path(name))
+    frames = score.note_frames()
+    assert (frames[:, 1] > frames[:, 0]).all()
+    assert score.roll().sum(axis=1).max() <= 10
+    assert score.onset[0] == 0
+
+
+def test_voices_end_together() -> None:
+    for song in SONGS.values():
+        ends = set()
+        for voice in song.voices:
+            alone = Song(song.title, song.tempo, song.bar, (voice,), upbeat=song.upbeat)
+            ends.add(round(to_score(alone).duration / (60 / song.tempo) / song.bar))
+        assert len(ends) == 1, song.title
+
+
+def test_notation() -> None:
+    song = Song("t", 60, 2, (Voice("C4 r*.5 F#4+Bb3*.5 | A0*2 |"),), pedal="P r |")
+    with pytest.raises(ScoreError, match="bar ends at beat 4"):
+        to_score(song)
+    score = to_score(Song("t", 60, 2, (Voice("C4 r*.5 F#4+Bb3*.5 | A0*2 |"),), pedal="P | r |"))
+    assert score.key.tolist() == [39, 37, 45, 0]
+    assert score.onset.tolist() == [0, 1.5, 1.5, 2]
+    assert score.offset == pytest.approx(np.array([0.95, 1.95, 1.95, 3.95]))
+    assert score.velocity.tolist() == [72, 64, 64, 72]
+    assert score.pedal == pytest.approx(np.array([[0, 1.95]]))
+    with pytest.raises(ScoreError, match="no such note"):
+        to_score(Song("t", 60, 2, (Voice("H4*2 |"),)))
+
+
+def test_music_is_imported_without_heavy_libraries() -> None:
+    heavy = {"symusic", "pretty_midi", "mido", "mir_eval", "torch"}
+    code = f"import pianomime.music, sys; print({heavy} & set(sys.modules))"
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == "set()"
