@@ -119,6 +119,13 @@ def test_zero_length_notes_are_kept(tmp_path: Path) -> None:
     assert np.flatnonzero(score.roll()[:, 39]).tolist() == [2]
 
 
+def test_a_lost_note_end_does_not_delay_all_later_ones(tmp_path: Path) -> None:
+    events = [event for beat in range(4) for event in note(60, 960 * beat, 960 * beat + 480)]
+    del events[1]
+    score = Score.from_midi(midi_file(tmp_path / "song.mid", events))
+    assert score.offset.tolist() == [1.5, 1.5, 2.5]  # the last strike has no end left
+
+
 def test_key_doubled_by_two_tracks_is_one_note(tmp_path: Path) -> None:
     path = midi_file(tmp_path / "song.mid", note(60, 0, 480), note(60, 0, 960, 1))
     score = Score.from_midi(path)

@@ -40,7 +40,7 @@ def read_midi(path: Path) -> Score:
     if not notes:
         raise ScoreError(f"{path} has no piano notes")
     begin = np.concatenate([each["time"] for each in notes]).astype(np.int64)
-    end = begin + np.concatenate([each["duration"] for each in notes])
+    end = np.concatenate([_first_ends(each) for each in notes])
     key = np.concatenate([each["pitch"] for each in notes]).astype(np.int64) - LOWEST_PITCH
     velocity = np.concatenate([each["velocity"] for each in notes]).astype(np.int64)
 
@@ -143,6 +143,26 @@ class _Clock:
         return np.asarray(
             self.second[tempo] + (tick - self.tick[tempo]) * self.tick_seconds[tempo], np.float64
         )
+
+
+def _first_ends(notes: dict[str, NDArray[Any]]) -> NDArray[np.int64]:
+    """(N,) tick at which each note of a track ends: the first end on its key after it began.
+
+    symusic pairs the first beginning on a key with the first end, the second with the second. After
+    one lost end every later note would last until after the next began. In pretty_midi, and so in
+    RoboPianist, an end is the end of all that sounds on the key.
+    """
+    begin = notes["time"].astype(np.int64)
+    end: NDArray[np.int64] = begin + notes["duration"]
+    # Keys one after the other on one axis, far enough apart that no search leaves its key.
+    start_of_key = notes["pitch"].astype(np.int64) * (end.max() + 1)
+    ends = np.sort(start_of_key + end)
+    first: NDArray[np.int64] = ends[
+        np.searchsorted(ends, start_of_key + begin, side="right") % len(ends)
+    ]
+    # A note without length keeps none.
+    first = np.where(end > begin, first - start_of_key, end)
+    return first
 
 
 def _join_doubled(
