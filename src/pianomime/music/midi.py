@@ -1,10 +1,11 @@
 """MIDI files to and from scores.
 
-Parsing is symusic's: of the two parsers at hand it is the strict one (a file that is cut off or
-has bytes changed is an error, never junk or a crash), it keeps zero-length notes, and it takes
-milliseconds where mido under pretty_midi takes seconds. Only its ticks are used. Its seconds are
-float32; here they are float64 and computed the way pretty_midi does, which decides on which side
-of a frame boundary a note falls and makes rolls equal to RoboPianist's cell for cell.
+Parsing is symusic's, 0.6 or later (0.5 crashes the process on damaged files): of the two parsers at
+hand it is the strict one (a file that is cut off or has bytes changed is an error), it keeps
+zero-length notes, and it takes milliseconds where mido under pretty_midi takes seconds. Only its
+ticks are used. Its seconds are float32; here they are float64 and computed the way pretty_midi
+does, which decides on which side of a frame boundary a note falls and makes rolls equal to
+RoboPianist's cell for cell.
 """
 
 from __future__ import annotations
