@@ -6,14 +6,28 @@ rendered again without simulating.
 
 from __future__ import annotations
 
+import os
+import zipfile
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.music import Score
+from pianomime.errors import InputError
+from pianomime.files import atomic
+from pianomime.music import Score, frame_metrics, notes_from_roll, onset_f1, pedal_f1
 from pianomime.plan import FingertipPlan
 
+FRAMES_A_SECOND = 20.0
+"""A frame is one control step, 0.05 s."""
+
+_VELOCITY = 64
+"""Of notes that nobody asked for."""
+
+_VERSION = 1
+_SCORE = ("key", "onset", "offset", "velocity", "pedal")
+_PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
+_FRAMES = ("ctrl", "qpos", "key_state", "pressed", "pedal", "blow_ups")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,3 +58,125 @@ class Performance:
     blow_ups: NDArray[np.int64]
     plan_seconds: float
     simulate_seconds: float
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.pressed)
+
+    @property
+    def song_seconds(self) -> float:
+        """Length of the played song [s]."""
+        return len(self) / FRAMES_A_SECOND
+
+    @property
+    def realtime_factor(self) -> float:
+        """Seconds of music played in a second of planning and simulating."""
+        return self.song_seconds / (self.plan_seconds + self.simulate_seconds)
+
+    @property
+    def dropped_notes(self) -> int:
+        """Number of notes that the planner left out."""
+        return 0 if self.plan is None else self.plan.dropped
+
+    def played(self) -> Score:
+        """What was played, as a Score: notes from the pressed keys, pedal from the score.
+
+        The simulated piano does not sense how hard a key is struck, so a note that was wanted
+        has the velocity that the score asks for.
+        """
+        key, onset, offset = notes_from_roll(self.pressed)
+        asked = np.zeros(self.pressed.shape, np.int64)
+        for note, (first, stop) in enumerate(self.score.note_frames()):
+            asked[first:stop, self.score.key[note]] = self.score.velocity[note]
+        velocity = np.full(len(key), _VELOCITY)
+        for note, (first, stop) in enumerate(_frames(onset, offset)):
+            heard = asked[first:stop, key[note]]
+            if heard.any():
+                velocity[note] = heard[heard > 0][0]
+        edges = np.flatnonzero(np.diff(np.pad(self.pedal, 1).astype(np.int8)))
+        pedal = edges.reshape(-1, 2) / FRAMES_A_SECOND
+        return Score(key, onset, offset, velocity, pedal, self.score.title)
+
+    def metrics(self) -> dict[str, float]:
+        """How well it was played, each 0..1.
+
+        Returns:
+            `precision`, `recall` and `f1`, frame by frame; `onset_f1`, note onsets within 50 ms;
+            `pedal_f1`.
+        """
+        wanted = self.score.roll()
+        frames = frame_metrics(wanted, self.pressed)
+        return {
+            "precision": frames.precision,
+            "recall": frames.recall,
+            "f1": frames.f1,
+            "onset_f1": onset_f1(
+                (self.score.key, self.score.onset), notes_from_roll(self.pressed)[:2]
+            ),
+            "pedal_f1": pedal_f1(self.score.pedal_roll(), self.pedal),
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write everything to one .npz file, whole or not at all.
+
+        Args:
+            path: where to; its folder must exist.
+        """
+        arrays: dict[str, NDArray[np.generic]] = {
+            "version": np.array(_VERSION),
+            "player": np.array(self.player),
+            "score_title": np.array(self.score.title),
+        }
+        for name in _SCORE:
+            arrays[f"score_{name}"] = getattr(self.score, name)
+        for name in (*_FRAMES, "plan_seconds", "simulate_seconds"):
+            arrays[name] = np.asarray(getattr(self, name))
+        if self.plan is not None:
+            for name in _PLAN:
+                arrays[f"plan_{name}"] = getattr(self.plan, name)
+        with atomic(path) as temporary:
+            np.savez_compressed(temporary, allow_pickle=False, **arrays)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Performance:
+        """Read what `save` wrote.
+
+        Args:
+            path: the .npz file.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            InputError: it is no performance, or one of a version that we do not know.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = dict(file)
+            version = int(arrays["version"])
+            if version != _VERSION:
+                raise InputError(
+                    f"{path}: a performance of version {version}; this program reads {_VERSION}"
+                )
+            score = Score(
+                **{name: arrays[f"score_{name}"] for name in _SCORE},
+                title=str(arrays["score_title"]),
+            )
+            plan = None
+            if "plan_fingertips" in arrays:
+                plan = FingertipPlan(**{name: arrays[f"plan_{name}"] for name in _PLAN})
+            return cls(
+                score=score,
+                player=str(arrays["player"]),
+                plan=plan,
+                **{name: arrays[name] for name in _FRAMES},
+                plan_seconds=float(arrays["plan_seconds"]),
+                simulate_seconds=float(arrays["simulate_seconds"]),
+            )
+        except (FileNotFoundError, InputError):
+            raise
+        except (KeyError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+            raise InputError(f"{path}: not a performance ({error})") from error
+
+
+def _frames(onset: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(N, 2) first frame and one past the last of notes that begin and end with a frame."""
+    return np.rint(np.stack([onset, offset], axis=1) * FRAMES_A_SECOND).astype(np.int64)

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pianomime.errors import InputError
+
 KEYS = 88
 LOWEST_PITCH = 21
 """MIDI pitch of key 0, the A at the bass end of the keyboard."""
@@ -18,7 +20,7 @@ MAX_SECONDS = 4 * 3600.0
 """Longest score. A damaged MIDI file can claim years, and its roll would not fit in memory."""
 
 
-class ScoreError(ValueError):
+class ScoreError(InputError):
     """Music that cannot be read or makes no sense; the message is one line for the user."""
 
 

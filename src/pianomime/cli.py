@@ -1,0 +1,112 @@
+"""The front door: finds the command, parses its typed config, runs it.
+
+Nothing heavy is imported before the command is known and its arguments are right. An error in
+what the user gave is one line on stderr and exit code 2; Ctrl-C is exit code 130.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import warnings
+from typing import NamedTuple, NoReturn, Protocol
+
+from pianomime import __version__
+from pianomime.errors import InputError
+
+
+class Runnable(Protocol):
+    """A command with its arguments filled in."""
+
+    def run(self) -> None:
+        """Do it.
+
+        Raises:
+            InputError: what was asked for cannot be done.
+            OSError: a file cannot be read or written.
+        """
+
+
+class Command(NamedTuple):
+    """Where a command's config dataclass is, which must be cheap to import."""
+
+    module: str
+    config: str
+    summary: str
+
+
+COMMANDS = {
+    "play": Command("pianomime.commands.play", "Play", "play a song and report on it"),
+    "evaluate": Command("pianomime.commands.evaluate", "Evaluate", "play and score many songs"),
+    "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
+}
+
+
+def _help() -> str:
+    listed = "\n".join(f"  {name:<10} {command.summary}" for name, command in COMMANDS.items())
+    return (
+        "usage: pianomime COMMAND ...\n\n"
+        "Give it a song, and two simulated robot hands play it.\n\n"
+        f"commands (each has its own --help):\n{listed}\n\n"
+        "examples:\n"
+        "  pianomime play ode-to-joy\n"
+        "  pianomime play SONG.mid -o out/song --seconds 60\n"
+        "  pianomime evaluate FOLDER -o out/all --jobs 2\n"
+    )
+
+
+def _fail(message: object) -> NoReturn:
+    print(f"pianomime: {message}", file=sys.stderr)
+    sys.exit(2)
+
+
+def _one_line(error: OSError) -> str:
+    if error.strerror and error.filename is not None:
+        return f"{os.fspath(error.filename)}: {error.strerror}"
+    return str(error)
+
+
+def _warn(message: Warning | str, *_: object, **__: object) -> None:
+    print(f"pianomime: warning: {message}", file=sys.stderr)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command.
+
+    Args:
+        arguments: what follows `pianomime`; None for those of this process.
+
+    Raises:
+        SystemExit: with code 2 for bad input, 130 for Ctrl-C, 0 after `--help` or `--version`.
+    """
+    try:
+        with warnings.catch_warnings():
+            # A user has no use for the line of our source that a warning points at.
+            warnings.showwarning = _warn
+            _run((sys.argv[1:] if arguments is None else arguments) or ["--help"])
+    except KeyboardInterrupt:
+        print("pianomime: stopped", file=sys.stderr)
+        sys.exit(130)
+    except InputError as error:
+        _fail(error)
+    except OSError as error:
+        _fail(_one_line(error))
+
+
+def _run(arguments: list[str]) -> None:
+    name, *rest = arguments
+    if name in ("-h", "--help"):
+        print(_help(), end="")
+    elif name == "--version":
+        print(f"pianomime {__version__}")
+    elif name not in COMMANDS:
+        raise InputError(f"there is no command {name!r}; there are: {', '.join(COMMANDS)}")
+    else:
+        import tyro
+
+        module, config, _ = COMMANDS[name]
+        command: Runnable = tyro.cli(
+            getattr(importlib.import_module(module), config), prog=f"pianomime {name}", args=rest
+        )
+        command.run()

@@ -1,0 +1,57 @@
+"""`pianomime evaluate`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Play and score many songs in parallel; print a Markdown table.
+
+    OUT then holds results.json and results.md. A run that was interrupted goes on where it was
+    when it is started again with the same OUT. A song that fails is a line of the table.
+
+    Examples:
+      pianomime evaluate FOLDER
+      pianomime evaluate FOLDER more/SONG.mid fur-elise -o out/all --jobs 4
+      pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
+    """
+
+    paths: tyro.conf.Positional[tuple[str, ...]]
+    """MIDI files, folders of them, or names of bundled songs."""
+    player: str = "zero-shot"
+    """Name of the player."""
+    seconds: float = 30.0
+    """How much of each song to play at most, from its first note [s]."""
+    jobs: int | None = None
+    """Songs played at the same time; one a core if not given."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """Folder for the results; out/evaluate-PLAYER if not given."""
+
+    def run(self) -> None:
+        """Evaluate and print.
+
+        Raises:
+            InputError: a path stands for no song, or there is no such player.
+            OSError: a file cannot be read or written.
+        """
+        from pianomime.commands.progress import bars
+        from pianomime.evaluation import evaluate, markdown
+
+        out = self.out or Path("out", f"evaluate-{self.player}")
+        with bars() as tell:
+            results = evaluate(
+                self.paths,
+                self.player,
+                self.seconds,
+                self.jobs,
+                out,
+                progress=lambda done, total, f1: tell("songs", done, total, f"mean F1 {f1:.3f}"),
+            )
+        print(markdown(results))
+        print(f"saved: {out / 'results.json'}")

@@ -1,0 +1,90 @@
+"""`pianomime play`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from pianomime.report import Row
+
+
+@dataclass(frozen=True)
+class Play:
+    """Play a song with two simulated hands, and report on it.
+
+    OUT then holds a page to look at and listen to (report.html), the numbers (report.json), the
+    performance itself (performance.npz) and as MIDI, WAV, picture and film.
+
+    Examples:
+      pianomime play ode-to-joy
+      pianomime play SONG.mid -o out/song --no-video
+      pianomime play SONG.mid --start 60 --seconds 180
+    """
+
+    song: tyro.conf.Positional[str]
+    """A MIDI file, or the name of a bundled song (see `pianomime songs`)."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """Folder for the report; out/NAME if not given."""
+    player: str = "zero-shot"
+    """Name of the player."""
+    seconds: float = 30.0
+    """How much to play at most, from the first note at or after START [s]."""
+    start: float = 0.0
+    """Where in the song to begin [s]."""
+    video: bool = True
+    """Render a film, where this machine can."""
+
+    def run(self) -> None:
+        """Play and write the report.
+
+        Raises:
+            InputError: there is nothing to play, or no such player.
+            OSError: a file cannot be read or written.
+        """
+        from rich.console import Console
+
+        from pianomime.commands.progress import bars
+        from pianomime.music import Score
+        from pianomime.play import Player, excerpt
+        from pianomime.report import FILES, staged, write_report
+        from pianomime.song_files import find_song
+
+        player = Player.from_name(self.player)
+        midi = find_song(self.song)
+        score = excerpt(Score.from_midi(midi), self.start, self.seconds)
+        out = self.out or Path("out", midi.stem)
+        notes: list[str] = []
+        with staged(out, FILES) as folder, bars() as tell:
+            row = write_report(
+                player.play(score, tell), folder, self.video, progress=tell, note=notes.append
+            )
+        Console().print(_table(row))
+        for note in notes:
+            print(note)
+        print(f"look and listen: {out / 'report.html'}")
+
+
+def _table(row: Row) -> Table:
+    from rich.table import Table
+
+    table = Table(title=str(row["song"]), title_style="bold", show_header=False)
+    for label, text in (
+        ("F1", f"{row['f1']:.3f}"),
+        ("precision, recall", f"{row['precision']:.3f}, {row['recall']:.3f}"),
+        ("onset F1, pedal F1", f"{row['onset_f1']:.3f}, {row['pedal_f1']:.3f}"),
+        ("notes (left out)", f"{row['notes']} ({row['dropped_notes']})"),
+        ("physics broke", f"{row['blow_ups']} times"),
+        (
+            "planned, simulated",
+            f"{row['plan_seconds']:.1f} s, {row['simulate_seconds']:.1f} s "
+            f"for {row['song_seconds']:.1f} s of music",
+        ),
+    ):
+        table.add_row(label, text)
+    return table

@@ -1,0 +1,16 @@
+"""`pianomime songs`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Songs:
+    """List the bundled songs, to be played by name: `pianomime play fur-elise`."""
+
+    def run(self) -> None:
+        """Print one name a line."""
+        from pianomime import songs
+
+        print("\n".join(songs.names()))

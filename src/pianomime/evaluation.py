@@ -1,0 +1,210 @@
+"""Scoring many songs: in parallel, resumable, and going on when one of them fails."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import queue
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+from pianomime.errors import InputError
+from pianomime.files import atomic
+from pianomime.play import SECONDS, Player
+from pianomime.song_files import find_songs
+from pianomime.song_worker import SongWorker
+
+Row = dict[str, Any]
+"""The numbers of one song (see `pianomime.report.numbers`), or `song` and `error`."""
+
+Progress = Callable[[int, int, float], None]
+"""Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
+
+
+def evaluate(
+    paths: str | Path | Iterable[str | Path],
+    player: str = "zero-shot",
+    seconds: float = SECONDS,
+    jobs: int | None = None,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Play and score songs, several at a time, each in a process of its own.
+
+    A song that fails becomes a row with an `error`, and the others go on. With a folder `out`,
+    a song that was finished there before by the same player and program is not played again, so
+    a run that was interrupted, however hard, goes on where it was.
+
+    Args:
+        paths: MIDI files, folders of them, or names of bundled songs.
+        player: name of the player.
+        seconds: how much of each song to play at most, from its first note [s].
+        jobs: processes; one a core if None.
+        out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
+        progress: told how far it is.
+
+    Returns:
+        What `results.json` holds: `player`, `songs` (a row each, in the order of `paths`) and
+        `mean` (of every number, over the songs that did not fail; empty if all did).
+
+    Raises:
+        InputError: a path stands for no song, or there is no such player.
+        OSError: `out` cannot be written.
+    """
+    songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
+    Player.from_name(player)
+    if not seconds > 0:
+        raise InputError(f"seconds must be more than 0, not {seconds:g}")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs must be 1 or more, not {jobs}")
+    store = None if out is None else _Store(Path(out), f"{player} {seconds:g}")
+
+    rows: dict[Path, Row] = {}
+
+    def finish(song: Path, row: Row) -> None:
+        rows[song] = row
+        if progress is not None:
+            f1 = [row["f1"] for row in rows.values() if "error" not in row]
+            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else float("nan"))
+
+    waiting = []
+    for song in songs:
+        known = None if store is None else store.get(song)
+        if known is None:
+            waiting.append(song)
+        else:
+            finish(song, known)
+    for song, row in _play_all(waiting, player, seconds, jobs or os.cpu_count() or 1):
+        if store is not None and "error" not in row:
+            store.put(song, row)
+        finish(song, row)
+
+    results = {
+        "player": player,
+        "songs": [rows[song] for song in songs],
+        "mean": _mean(list(rows.values())),
+    }
+    if store is not None:
+        store.close(results)
+    return results
+
+
+def markdown(results: dict[str, Any]) -> str:
+    """The results as a Markdown table, a line a song and one of the means.
+
+    Args:
+        results: what `evaluate` returns.
+    """
+    columns = ("f1", "precision", "recall", "onset_f1", "pedal_f1", "realtime_factor")
+    lines = [
+        "| song | F1 | precision | recall | onset F1 | pedal F1 | real time | left out | broke |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+
+    def cells(row: Row) -> list[str]:
+        return [f"{row[name]:.3f}" for name in columns[:-1]] + [f"{row[columns[-1]]:.1f}x"]
+
+    for row in results["songs"]:
+        # A bar in a title or an error would end the cell.
+        song = str(row["song"]).replace("|", "\\|")
+        if "error" in row:
+            error = str(row["error"]).replace("|", "\\|")
+            lines.append(f"| {song} | failed: {error} | | | | | | | |")
+        else:
+            whole = f"{row['dropped_notes']}/{row['notes']} | {row['blow_ups']}"
+            lines.append(f"| {song} | {' | '.join(cells(row))} | {whole} |")
+    mean = results["mean"]
+    if mean:
+        whole = f"{mean['dropped_notes']:.1f}/{mean['notes']:.1f} | {mean['blow_ups']:.1f}"
+        lines.append(f"| **mean** | {' | '.join(cells(mean))} | {whole} |")
+    return "\n".join(lines) + "\n"
+
+
+def _mean(rows: list[Row]) -> dict[str, float]:
+    """Mean of every number over the rows without an error."""
+    good = [row for row in rows if "error" not in row]
+    if not good:
+        return {}
+    names = [name for name, value in good[0].items() if not isinstance(value, str)]
+    return {name: round(sum(row[name] for row in good) / len(good), 6) for name in names}
+
+
+class _Store:
+    """Finished songs in a folder: one file each, written whole, named by what made it."""
+
+    def __init__(self, out: Path, setting: str) -> None:
+        if out.exists() and not out.is_dir():
+            raise InputError(f"{out}: is a file; a folder is needed")
+        self._out = out
+        self._songs = out / "songs"
+        self._songs.mkdir(parents=True, exist_ok=True)
+        self._made_by = f"{setting} {_program_hash()}".encode()
+
+    def get(self, song: Path) -> Row | None:
+        try:
+            row: Row = json.loads(self._file(song).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return row
+
+    def put(self, song: Path, row: Row) -> None:
+        self._write(self._file(song), _json(row))
+
+    def close(self, results: dict[str, Any]) -> None:
+        self._write(self._out / "results.json", _json(results))
+        self._write(self._out / "results.md", markdown(results))
+
+    def _file(self, song: Path) -> Path:
+        digest = hashlib.sha256(self._made_by)
+        digest.update(song.read_bytes())
+        return self._songs / f"{song.stem}-{digest.hexdigest()[:16]}.json"
+
+    @staticmethod
+    def _write(path: Path, text: str) -> None:
+        with atomic(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _program_hash() -> str:
+    """Changes with our code and figures, so that results of another program are not reused."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.rglob("*")):
+        if file.suffix in (".py", ".json"):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def _play_all(
+    songs: list[Path], player: str, seconds: float, jobs: int
+) -> Iterator[tuple[Path, Row]]:
+    """Songs with their rows, in the order in which they finish."""
+    if not songs:
+        return
+    idle: queue.SimpleQueue[SongWorker] = queue.SimpleQueue()
+    workers = [SongWorker(player, seconds) for _ in range(min(jobs, len(songs)))]
+    for worker in workers:
+        idle.put(worker)
+
+    def play(song: Path) -> tuple[Path, Row]:
+        worker = idle.get()
+        try:
+            return song, worker.play(song)
+        finally:
+            idle.put(worker)
+
+    # The threads only wait for the processes.
+    threads = ThreadPoolExecutor(len(workers))
+    try:
+        for future in as_completed([threads.submit(play, song) for song in songs]):
+            yield future.result()
+    finally:
+        threads.shutdown(wait=False, cancel_futures=True)
+        for worker in workers:
+            worker.close()

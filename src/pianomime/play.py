@@ -1,0 +1,143 @@
+"""Player: a planner and a tracker that together perform a score in the World."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pianomime.errors import InputError
+from pianomime.music import Score
+from pianomime.performance import Performance
+from pianomime.plan import Planner
+from pianomime.track.tracker import Tracker
+from pianomime.world import World
+
+Progress = Callable[[str, int, int], None]
+"""Called with a stage ("planning", "playing"), the steps done and the steps in all (0: unknown)."""
+
+SECONDS = 30.0
+"""Length of an excerpt unless told otherwise: the longest clip of the paper's protocol."""
+
+
+def excerpt(score: Score, start: float = 0.0, seconds: float = SECONDS) -> Score:
+    """The part of a score that is played: from the first sound at or after `start`.
+
+    Leading silence is left out, as in the paper's protocol, so that it neither costs time nor
+    counts as perfect playing.
+
+    Args:
+        score: the whole song.
+        start: where to begin looking for the first note [s].
+        seconds: length of the excerpt at most [s]; may be infinite.
+
+    Raises:
+        InputError: a time is out of range, or nothing sounds after `start`.
+    """
+    if not seconds > 0:
+        raise InputError(f"seconds must be more than 0, not {seconds:g}")
+    if not 0 <= start < math.inf:
+        raise InputError(f"start must be 0 or more, not {start:g}")
+    if start and start >= score.duration:
+        raise InputError(
+            f"nothing to play from {start:g} s on: {score.title} lasts {score.duration:.1f} s"
+        )
+    return score.clip(start, math.inf).trim_silence().clip(0.0, seconds)
+
+
+@dataclass(frozen=True)
+class Player:
+    """Plays scores: the planner decides where the fingertips go, the tracker gets them there.
+
+    Attributes:
+        name: what reports call it.
+        planner: makes a FingertipPlan of a Score.
+        tracker: makes controls of the plan and the state of the World.
+    """
+
+    name: str
+    planner: Planner
+    tracker: Tracker
+
+    @classmethod
+    def from_name(cls, name: str) -> Player:
+        """A player that the house knows.
+
+        Args:
+            name: one of `PLAYERS`.
+
+        Raises:
+            InputError: there is no such player; the message lists those there are.
+        """
+        if name not in PLAYERS:
+            raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
+        return PLAYERS[name]()
+
+    def play(self, score: Score, progress: Progress | None = None) -> Performance:
+        """Perform a score from the rest pose; the same score gives the same performance.
+
+        Args:
+            score: what to play; all of it is played (see `excerpt`).
+            progress: told how far it is.
+        """
+        tell = progress or (lambda stage, done, total: None)
+        tell("planning", 0, 0)
+        began = time.perf_counter()
+        plan = self.planner.plan(score)
+        planned = time.perf_counter()
+
+        frames = len(score.roll())
+        pedal = score.pedal_roll()
+        ctrl = np.empty((frames, 46))
+        qpos = np.empty((frames, 142))
+        key_state = np.empty((frames, 88))
+        pressed = np.empty((frames, 88), bool)
+        blow_ups = []
+        world = World()
+        self.tracker.begin(plan)
+        for frame in range(frames):
+            broken = world.blow_ups
+            ctrl[frame] = self.tracker.control(frame, world)
+            world.step(ctrl[frame], pedal=bool(pedal[frame]))
+            qpos[frame], key_state[frame] = world.qpos, world.key_state
+            pressed[frame] = world.pressed
+            if world.blow_ups > broken:
+                blow_ups.append(frame)
+            tell("playing", frame + 1, frames)
+        return Performance(
+            score=score,
+            player=self.name,
+            plan=plan,
+            ctrl=ctrl,
+            qpos=qpos,
+            key_state=key_state,
+            pressed=pressed,
+            pedal=pedal,
+            blow_ups=np.array(blow_ups, np.int64),
+            plan_seconds=planned - began,
+            simulate_seconds=time.perf_counter() - planned,
+        )
+
+
+def _zero_shot() -> Player:
+    from pianomime.plan import ZeroShotPlanner
+    from pianomime.track import DynamicTracker
+
+    return Player("zero-shot", ZeroShotPlanner(), DynamicTracker())
+
+
+def _zero_shot_ik() -> Player:
+    from pianomime.plan import ZeroShotPlanner
+    from pianomime.track import IkTracker
+
+    return Player("zero-shot-ik", ZeroShotPlanner(), IkTracker())
+
+
+PLAYERS: dict[str, Callable[[], Player]] = {
+    "zero-shot": _zero_shot,
+    "zero-shot-ik": _zero_shot_ik,
+}
+"""Every player by name. A new one is one more line, with the import inside its function."""

@@ -1,0 +1,175 @@
+"""`report.html`: one page that holds everything there is to see and hear, and needs no network."""
+
+from __future__ import annotations
+
+import base64
+from html import escape
+from string import Template
+
+from pianomime.report.numbers import Row
+
+_PAGE = Template("""\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>$song - PianoMime</title>
+<style>
+:root {
+  --paper: #f3f5f8; --card: #ffffff; --text: #1c2430; --faint: #6b7686; --line: #dde1e7;
+  --accent: #2467c9;
+}
+@media (prefers-color-scheme: dark) {
+  :root {
+    --paper: #0f1216; --card: #171b21; --text: #e8ecf2; --faint: #8d98a8; --line: #2c333d;
+    --accent: #5b9bf0;
+  }
+}
+* { box-sizing: border-box; }
+body {
+  margin: 0; background: var(--paper); color: var(--text);
+  font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif;
+}
+main { max-width: 1120px; margin: 0 auto; padding: 2.5rem 1.25rem 3rem; }
+h1 { margin: 0; font-size: 1.9rem; line-height: 1.2; overflow-wrap: anywhere; }
+.under { margin: .35rem 0 1.6rem; color: var(--faint); }
+section {
+  background: var(--card); border: 1px solid var(--line); border-radius: 14px;
+  padding: 1.1rem 1.25rem; margin-bottom: 1.1rem;
+}
+h2 { margin: 0 0 .7rem; font-size: .95rem; font-weight: 600; color: var(--faint); }
+.tiles {
+  display: grid; grid-template-columns: repeat(auto-fit, minmax(140px, 1fr)); gap: .9rem;
+  padding: 0; margin: 0 0 1.1rem;
+}
+.tiles div {
+  background: var(--card); border: 1px solid var(--line); border-radius: 14px;
+  padding: .85rem 1.1rem;
+}
+.tiles dt { color: var(--faint); font-size: .85rem; }
+.tiles dd { margin: 0; font-size: 1.65rem; font-weight: 650; font-variant-numeric: tabular-nums; }
+.tiles div:first-child dd { color: var(--accent); }
+.sounds {
+  display: grid; grid-template-columns: repeat(auto-fit, minmax(280px, 1fr)); gap: 1rem;
+}
+.sounds p { margin: 0 0 .4rem; }
+audio, video, img { display: block; width: 100%; border-radius: 8px; }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
+td { padding: .35rem 0; border-top: 1px solid var(--line); vertical-align: top; }
+tr:first-child td { border-top: 0; }
+td:nth-child(2) { text-align: right; padding-left: 1rem; white-space: nowrap; }
+small { color: var(--faint); }
+.warning { border-left: 4px solid #d3124a; }
+footer { color: var(--faint); font-size: .85rem; }
+</style>
+</head>
+<body>
+<main>
+<h1>$song</h1>
+<p class="under">Played by two simulated Shadow hands &middot; player <b>$player</b></p>
+$warning<dl class="tiles">
+$tiles</dl>
+$film<section>
+<h2>Sound</h2>
+<div class="sounds">
+<div><p>What the hands played</p><audio controls src="$played"></audio></div>
+<div><p>What the score asks for</p><audio controls src="$wanted"></audio></div>
+</div>
+</section>
+<section>
+<h2>Piano roll</h2>
+<picture>
+<source media="(prefers-color-scheme: dark)" srcset="$dark_picture">
+<img alt="Piano roll: notes wanted, played, missed and wrong, coloured by hand" src="$picture">
+</picture>
+</section>
+<section>
+<h2>In numbers</h2>
+<table>
+$rows</table>
+</section>
+<footer>Made by PianoMime $version. F1 counts keys down in every twentieth of a second;
+a note's onset counts when it is within 50 ms.</footer>
+</main>
+</body>
+</html>
+""")
+
+_TILES = {
+    "f1": "F1",
+    "precision": "Precision",
+    "recall": "Recall",
+    "onset_f1": "Onset F1",
+    "pedal_f1": "Pedal F1",
+}
+_ROWS = {
+    "song_seconds": ("Length of the song", "{:.1f} s"),
+    "frames": ("Frames of 0.05 s", "{}"),
+    "notes": ("Notes in the score", "{}"),
+    "dropped_notes": ("Notes left out: more than ten fingers can reach", "{}"),
+    "blow_ups": ("Frames in which the physics broke", "{}"),
+    "plan_seconds": ("Time to plan", "{:.2f} s"),
+    "simulate_seconds": ("Time to simulate", "{:.2f} s"),
+    "realtime_factor": ("Seconds of music a second of computing", "{:.1f}"),
+}
+
+
+def page(
+    numbers: Row,
+    version: str,
+    played: bytes,
+    wanted: bytes,
+    picture: bytes,
+    dark_picture: bytes,
+    film: bytes | None,
+) -> str:
+    """The report as one self-contained HTML page.
+
+    Args:
+        numbers: what `pianomime.report.numbers` gives.
+        version: of PianoMime.
+        played: MP3 of the performance.
+        wanted: MP3 of the score.
+        picture: PNG of the piano roll for light pages.
+        dark_picture: the same for dark pages.
+        film: MP4, if there is one.
+    """
+    tiles = (
+        f"<div><dt>{label}</dt><dd>{numbers[name]:.3f}</dd></div>\n"
+        for name, label in _TILES.items()
+    )
+    rows = (
+        f"<tr><td>{label}</td><td>{form.format(numbers[name])}</td></tr>\n"
+        for name, (label, form) in _ROWS.items()
+    )
+    film_section = warning = ""
+    if film is not None:
+        film_section = (
+            "<section>\n<h2>Film</h2>\n"
+            f'<video controls preload="metadata" src="{_data("video/mp4", film)}"></video>\n'
+            "</section>\n"
+        )
+    if numbers["blow_ups"]:
+        warning = (
+            '<section class="warning">The physics broke during this performance and the hands '
+            "had to be put back: the numbers may be worse than the player.</section>\n"
+        )
+    return _PAGE.substitute(
+        song=escape(str(numbers["song"])),
+        player=escape(str(numbers["player"])),
+        version=escape(version),
+        tiles="".join(tiles),
+        rows="".join(rows),
+        film=film_section,
+        warning=warning,
+        played=_data("audio/mpeg", played),
+        wanted=_data("audio/mpeg", wanted),
+        picture=_data("image/png", picture),
+        dark_picture=_data("image/png", dark_picture),
+    )
+
+
+def _data(kind: str, content: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

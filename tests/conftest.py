@@ -1,0 +1,18 @@
+"""Fixtures for all tests."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of reference data, which a user's machine does not have."""
+    beside = Path(__file__).parents[2] / "shared"
+    folder = Path(os.environ.get("PIANOMIME_SHARED", beside))
+    if not folder.is_dir():
+        pytest.skip(f"no reference data at {folder} (PIANOMIME_SHARED names another place)")
+    return folder

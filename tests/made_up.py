@@ -1,0 +1,70 @@
+"""Scores and performances made up for tests of what is done with them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pianomime.music import Score
+from pianomime.performance import Performance
+from pianomime.plan import NO_KEY, FingertipPlan
+
+MIDDLE_C = 39
+
+
+def score(notes: int = 60, seconds: float = 8.0, title: str = "made up", seed: int = 0) -> Score:
+    """Random notes on both sides of middle C, and some pedal."""
+    draw = np.random.default_rng(seed)
+    onset = np.sort(draw.uniform(0, seconds - 0.5, notes))
+    onset[0] = 0.0
+    return Score(
+        key=draw.integers(20, 66, notes),
+        onset=onset,
+        offset=onset + draw.uniform(0.1, 0.5, notes),
+        velocity=draw.integers(30, 110, notes),
+        pedal=np.array([[0.5, 2.0], [3.0, 3.5]]),
+        title=title,
+    )
+
+
+def plan(score: Score) -> FingertipPlan:
+    """Each note to the hand of its side; the first note to none."""
+    frames = len(score.roll())
+    hand = np.where(score.key < MIDDLE_C, 0, 1).astype(np.int8)
+    hand[0] = -1
+    return FingertipPlan(
+        fingertips=np.linspace(0, 1, frames * 36).reshape(frames, 2, 6, 3),
+        finger_key=np.full((frames, 2, 5), NO_KEY, np.int8),
+        note_hand=hand,
+        note_finger=np.where(hand < 0, -1, 2).astype(np.int8),
+    )
+
+
+def performance(
+    score: Score, mistakes: float = 0.1, planned: bool = True, seed: int = 0
+) -> Performance:
+    """The score played with a share of its notes missed, late or on the next key."""
+    draw = np.random.default_rng(seed)
+    frames = len(score.roll())
+    pressed = np.zeros((frames, 88), bool)
+    for key, (first, stop) in zip(score.key, score.note_frames(), strict=True):
+        luck = draw.random()
+        if luck < mistakes:
+            continue
+        if luck < 2 * mistakes:
+            first += 1
+        if luck > 1 - mistakes / 2:
+            key += 1
+        pressed[first:stop, key] = True
+    return Performance(
+        score=score,
+        player="made up",
+        plan=plan(score) if planned else None,
+        ctrl=draw.normal(size=(frames, 46)),
+        qpos=draw.normal(size=(frames, 142)),
+        key_state=pressed * 0.97,
+        pressed=pressed,
+        pedal=score.pedal_roll(),
+        blow_ups=np.array([3], np.int64),
+        plan_seconds=0.25,
+        simulate_seconds=0.5,
+    )

@@ -1,0 +1,166 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import wave
+from pathlib import Path
+
+import pytest
+
+from pianomime import songs
+from pianomime.cli import COMMANDS, main
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run in an empty folder; nothing but what a test asks for may be left there."""
+    monkeypatch.chdir(tmp_path)
+
+
+def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """Run, expect exit code 2 and one line on stderr, and return that line."""
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    lines = printed.err.splitlines()
+    assert len(lines) == 1, printed.err
+    assert lines[0].startswith("pianomime: ")
+    return lines[0]
+
+
+def test_help_is_there_and_cheap() -> None:
+    heavy = ("numpy", "mujoco", "matplotlib", "torch", "rich", "pianomime.play")
+    script = (
+        "import sys, pianomime.cli as cli\n"
+        "try: cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        f"print([name for name in {heavy} if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    *text, loaded = done.stdout.splitlines()
+    assert loaded == "[]"
+    for command in COMMANDS:
+        assert any(line.strip().startswith(command) for line in text)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_examples(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main([command, "--help"])
+    assert stopped.value.code == 0
+    assert f"pianomime {command}" in capsys.readouterr().out
+
+
+def test_the_module_can_be_run() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "pianomime", "--version"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.startswith("pianomime 0.")
+
+
+def test_bundled_songs_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["songs"])
+    assert capsys.readouterr().out.split() == list(songs.names())
+
+
+def test_play_writes_the_whole_report(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["play", "ode-to-joy", "-o", "out", "--seconds", "2", "--no-video"])
+    row = json.loads(Path("out/report.json").read_text(encoding="utf-8"))
+    assert row["player"] == "zero-shot"
+    assert 0 < row["f1"] <= 1
+    assert row["song_seconds"] == pytest.approx(2.0, abs=0.1)
+    with wave.open("out/performance.wav") as sound:
+        assert sound.getnframes() / sound.getframerate() >= 1.5
+    assert str(Path("out/report.html")) in capsys.readouterr().out
+    assert os.listdir() == ["out"]
+
+
+def test_play_goes_to_a_folder_named_after_the_song_by_default() -> None:
+    Path("my song.MID").write_bytes(songs.path("beethoven-ode-to-joy").read_bytes())
+    main(["play", "my song.MID", "--seconds", "1", "--no-video"])
+    assert Path("out/my song/report.html").exists()
+
+
+def test_what_cannot_be_played_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    song = songs.path("beethoven-ode-to-joy")
+    whole = song.read_bytes()
+    Path("empty.mid").write_bytes(b"")
+    Path("text.mid").write_text("this is no music")
+    Path("cut.mid").write_bytes(whole[: len(whole) // 2])
+    Path("silent.mid").write_bytes(b"MThd\0\0\0\6\0\0\0\1\1\xe0" + b"MTrk\0\0\0\4\0\xff\x2f\0")
+    Path("folder.mid").mkdir()
+    for name in ("empty.mid", "text.mid", "cut.mid", "silent.mid", "folder.mid"):
+        assert name in fails(["play", name], capsys)
+    assert "ode-to-joy" in fails(["play", "nothing_of_the_kind"], capsys)
+    assert sorted(os.listdir()) == ["cut.mid", "empty.mid", "folder.mid", "silent.mid", "text.mid"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--player", "liszt"], "zero-shot"),
+        (["--seconds", "0"], "seconds must be more than 0"),
+        (["--seconds", "-1"], "seconds must be more than 0"),
+        (["--start", "-1"], "start must be 0 or more"),
+        (["--start", "9999"], "nothing to play from 9999 s"),
+        (["-o", "file"], "file: is a file"),
+        (["-o", "file/below"], "file: is a file"),
+        (["-o", "/proc/pianomime/out"], "/proc"),
+    ],
+)
+def test_options_that_make_no_sense_are_one_line(
+    options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("file").write_text("theirs")
+    assert message in fails(["play", "ode-to-joy", *options], capsys)
+    assert os.listdir() == ["file"]
+    assert Path("file").read_text() == "theirs"
+
+
+def test_evaluate_refuses_what_makes_no_sense(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("nothing").mkdir()
+    Path("file").write_text("")
+    assert "no MIDI files" in fails(["evaluate", "nothing"], capsys)
+    assert "no songs" in fails(["evaluate"], capsys)
+    assert "missing.mid" in fails(["evaluate", "missing.mid"], capsys)
+    assert "zero-shot" in fails(["evaluate", "ode-to-joy", "--player", "liszt"], capsys)
+    assert "jobs" in fails(["evaluate", "ode-to-joy", "--jobs", "0"], capsys)
+    assert "is a file" in fails(["evaluate", "ode-to-joy", "-o", "file"], capsys)
+
+
+def test_an_unknown_command_is_refused_with_a_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "play, evaluate" in fails(["perform"], capsys)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is another thing on Windows")
+@pytest.mark.parametrize("command", ["play", "evaluate"])
+def test_ctrl_c_ends_with_130_and_leaves_nothing_half_done(command: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pianomime", command, "ode-to-joy", "-o", str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    began = time.monotonic()
+    # Its temporary folder, or that of its songs, shows that it is at work.
+    while not any(tmp_path.glob(".pianomime-*")) and not out.exists():
+        assert process.poll() is None, process.stderr and process.stderr.read()
+        assert time.monotonic() < began + 60
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert errors.splitlines() == ["pianomime: stopped"]
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+    assert not any(tmp_path.glob(".pianomime-*"))

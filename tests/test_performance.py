@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import made_up
+from pianomime import Performance
+from pianomime.errors import InputError
+from pianomime.plan import FingertipPlan
+
+
+def assert_same(one: object, other: object) -> None:
+    """Equal in every field, bit for bit, types of arrays included."""
+    assert type(one) is type(other)
+    for field in fields(one):  # type: ignore[arg-type]
+        mine, its = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(mine, np.ndarray):
+            assert mine.dtype == its.dtype
+            np.testing.assert_array_equal(mine, its)
+        elif hasattr(mine, "__dataclass_fields__"):
+            assert_same(mine, its)
+        else:
+            assert mine == its
+
+
+@pytest.mark.parametrize("planned", [True, False])
+def test_what_is_saved_comes_back_exactly(tmp_path: Path, planned: bool) -> None:
+    performance = made_up.performance(made_up.score(title="Für Elise"), planned=planned)
+    performance.save(tmp_path / "performance.npz")
+    assert_same(Performance.load(tmp_path / "performance.npz"), performance)
+    assert [file.name for file in tmp_path.iterdir()] == ["performance.npz"]
+
+
+def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "performance.npz"
+    made_up.performance(made_up.score()).save(path)
+    before = path.read_bytes()
+
+    def interrupted(target: Path, **_: object) -> None:
+        Path(target).write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez_compressed", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        made_up.performance(made_up.score(seed=1)).save(path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["performance.npz"]
+
+
+@pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04 half a zip"])
+def test_what_is_no_performance_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "performance.npz"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="not a performance"):
+        Performance.load(path)
+
+
+def test_other_arrays_and_other_versions_are_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "other.npz", numbers=np.arange(3))
+    with pytest.raises(InputError, match="not a performance"):
+        Performance.load(tmp_path / "other.npz")
+    np.savez(tmp_path / "newer.npz", version=np.array(99))
+    with pytest.raises(InputError, match="version 99"):
+        Performance.load(tmp_path / "newer.npz")
+    with pytest.raises(FileNotFoundError):
+        Performance.load(tmp_path / "missing.npz")
+
+
+def test_perfect_playing_scores_one_and_gives_the_score_back() -> None:
+    score = made_up.score(notes=20, seed=3)
+    performance = made_up.performance(score, mistakes=0.0)
+    assert performance.metrics()["f1"] == 1.0
+    assert performance.metrics()["pedal_f1"] == 1.0
+    played = performance.played()
+    # A score that ends within a frame is played to the end of it.
+    frames = min(played.frames(), score.frames())
+    np.testing.assert_array_equal(played.roll()[:frames], score.roll()[:frames])
+    assert set(played.velocity) <= set(score.velocity)
+    np.testing.assert_allclose(played.pedal, score.pedal)
+
+
+def test_silence_is_a_performance_too() -> None:
+    performance = made_up.performance(made_up.score(), mistakes=1.1)
+    assert not performance.pressed.any()
+    metrics = performance.metrics()
+    assert metrics["recall"] < 0.5
+    assert metrics["onset_f1"] == 0.0
+    assert len(performance.played()) == 0
+
+
+def test_a_plan_of_another_length_is_not_accepted() -> None:
+    plan = made_up.plan(made_up.score())
+    with pytest.raises(ValueError, match="finger_key"):
+        FingertipPlan(plan.fingertips[1:], plan.finger_key, plan.note_hand, plan.note_finger)

@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+import json
+import os
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+import made_up
+from pianomime import Performance
+from pianomime.errors import InputError
+from pianomime.music import Score
+from pianomime.report import DARK, FILES, draw, numbers, staged, write_report
+from pianomime.report.mp3 import mp3
+
+PROTOCOL = (
+    "song", "player", "song_seconds", "frames", "precision", "recall", "f1", "onset_f1",
+    "pedal_f1", "plan_seconds", "simulate_seconds", "realtime_factor",
+)  # fmt: skip
+
+
+def test_numbers_hold_what_was_agreed() -> None:
+    score = made_up.score()
+    row = numbers(made_up.performance(score))
+    assert set(row) == {*PROTOCOL, "notes", "dropped_notes", "blow_ups"}
+    assert row["frames"] == len(score.roll())
+    assert row["dropped_notes"] == 1
+    assert row["blow_ups"] == 1
+    assert row["realtime_factor"] == pytest.approx(row["song_seconds"] / 0.75, abs=1e-3)
+
+
+class Page(HTMLParser):
+    """Collects the addresses that a page refers to."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.sources: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.sources += [value or "" for name, value in attrs if name in ("src", "srcset", "href")]
+
+
+def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) -> None:
+    performance = made_up.performance(made_up.score(title="<b>Bach & Söhne</b>"))
+    row = write_report(performance, tmp_path, False, lambda *_: None, pytest.fail)
+
+    assert {file.name for file in tmp_path.iterdir()} == set(FILES) - {"performance.mp4"}
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == row
+    np.testing.assert_array_equal(
+        Performance.load(tmp_path / "performance.npz").pressed, performance.pressed
+    )
+    played = Score.from_midi(tmp_path / "performance.mid").roll()
+    np.testing.assert_array_equal(played, performance.pressed[: len(played)])
+    assert not performance.pressed[len(played) :].any()
+
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "&lt;b&gt;Bach &amp; Söhne" in html
+    sources = Page(html).sources
+    assert len(sources) == 4
+    assert all(source.startswith("data:") for source in sources)
+
+
+def test_silence_can_be_reported(tmp_path: Path) -> None:
+    performance = made_up.performance(made_up.score(notes=3), mistakes=1.1, planned=False)
+    write_report(performance, tmp_path, False, lambda *_: None, pytest.fail)
+    assert (tmp_path / "report.html").exists()
+
+
+def test_without_opengl_one_line_says_so_and_the_rest_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from pianomime.world import render
+
+    def nothing(*_: object, **__: object) -> None:
+        raise render.RenderUnavailable("no film: install OpenGL")
+
+    monkeypatch.setattr(render, "write_video", nothing)
+    notes: list[str] = []
+    write_report(
+        made_up.performance(made_up.score(notes=3)), tmp_path, True, lambda *_: None, notes.append
+    )
+    assert notes == ["no film: install OpenGL"]
+    assert (tmp_path / "report.html").exists()
+    assert not (tmp_path / "performance.mp4").exists()
+
+
+@pytest.mark.parametrize("seconds", [1.0, 60.0])
+def test_pictures_show_every_kind_of_note(tmp_path: Path, seconds: float) -> None:
+    performance = made_up.performance(made_up.score(notes=100, seconds=seconds), mistakes=0.2)
+    draw(performance, tmp_path / "roll.png", DARK)
+    pixels = (imread(tmp_path / "roll.png")[..., :3] * 255).round().astype(int)
+    colours = {f"#{colour:06x}" for colour in np.unique(pixels @ [65536, 256, 1])}
+    assert {*DARK.hands[:2], DARK.wrong, *DARK.wanted[:2], DARK.paper} <= colours
+
+
+def test_an_hour_is_drawn_too(tmp_path: Path) -> None:
+    score = made_up.score(notes=50, seconds=3600.0)
+    draw(made_up.performance(score), tmp_path / "roll.png")
+    assert imread(tmp_path / "roll.png").shape[0] < 12_000
+
+
+def test_mp3_has_the_length_of_the_sound() -> None:
+    import io
+
+    import av
+
+    seconds = 2.0
+    sound = np.sin(np.arange(int(44100 * seconds))[:, None] * 0.06 * np.ones(2)).astype(np.float32)
+    with av.open(io.BytesIO(mp3(sound, 44100))) as file:
+        decoded = sum(frame.samples for frame in file.decode(audio=0))
+    assert decoded / 44100 == pytest.approx(seconds, abs=0.1)
+
+
+def test_staged_files_appear_together(tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    with staged(out, ["a", "b"]) as folder:
+        (folder / "a").write_text("new")
+        assert not out.exists()
+    assert {file.name for file in out.iterdir()} == {"a"}
+    assert os.listdir(tmp_path) == ["deep"]
+
+
+def test_staging_replaces_what_is_ours_and_nothing_else(tmp_path: Path) -> None:
+    for name in ("a", "b", "theirs"):
+        (tmp_path / name).write_text("old")
+    with staged(tmp_path, ["a", "b"]) as folder:
+        (folder / "a").write_text("new")
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {
+        "a": "new",
+        "theirs": "old",
+    }
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_a_stopped_staging_leaves_nothing(tmp_path: Path, error: type[BaseException]) -> None:
+    out = tmp_path / "deep" / "out"
+
+    def write() -> None:
+        with staged(out, ["a"]) as folder:
+            (folder / "a").write_text("half")
+            raise error
+
+    with pytest.raises(error):
+        write()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_is_no_place_for_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for out in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(InputError, match="is a file"), staged(out, []):
+            pytest.fail("should not get here")
