@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Set PianoMime up and run it, with nothing but Python 3.11 or newer.
 
-    ./do play [SONG] [OPTIONS]   play a song (the bundled "ode_to_joy" if none is named)
+    ./do play [SONG] [OPTIONS]   play a song (the bundled "ode-to-joy" if none is named)
     ./do test [PYTEST OPTIONS]   run the test suite
     ./do lint                    run ruff and mypy
     ./do run COMMAND             run any command inside the environment, such as
@@ -23,7 +23,7 @@ VENV = os.path.abspath(os.environ.get("PIANOMIME_VENV", os.path.join(ROOT, ".ven
 BIN = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
 PYTHON = os.path.join(BIN, "python.exe" if os.name == "nt" else "python")
 OLDEST = (3, 11)
-DEFAULT_SONG = "ode_to_joy"
+DEFAULT_SONG = "ode-to-joy"
 
 
 def stop(message):
