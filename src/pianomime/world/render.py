@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from pianomime.files import atomic
 from pianomime.world.figures import KEYS
 from pianomime.world.model import build_spec
-from pianomime.world.scene_look import CAMERAS, dress, key_colours
+from pianomime.world.scene_look import CAMERAS, LAMP_OFF, dress, key_colours
 
 FILM_SIZE = (1280, 544)
 """Width and height of a film [pixels]: the keyboard is long."""
@@ -67,7 +67,11 @@ class Painter:
         self.width, self.height = width, height
         self._model = _dressed_model(width, height)
         self._data = mujoco.MjData(self._model)
-        self._key_geoms = np.array([self._model.geom(f"key_{key}").id for key in range(KEYS)])
+        self._keys, self._lamps = (
+            np.array([self._model.geom(f"{name}_{key}").id for key in range(KEYS)])
+            for name in ("key", "lamp")
+        )
+        self._resting = key_colours(np.zeros(KEYS, bool))
         self._scene = mujoco.MjvScene(self._model, _MAX_GEOMS)
         # Mirror images double the work, and little here is polished.
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
@@ -99,13 +103,16 @@ class Painter:
 
         Args:
             qpos: (142,) positions: 88 keys, right hand 27, left hand 27 [rad, m].
-            colours: (88, 3) red, green and blue of each key, 0..1.
+            colours: (88, 3) red, green and blue of each key, 0..1; the lamps behind keys that
+                differ from their colour at rest are lit in it.
 
         Returns:
             (height, width, 3) uint8.
         """
         self._data.qpos[:] = qpos
-        self._model.geom_rgba[self._key_geoms, :3] = colours
+        self._model.geom_rgba[self._keys, :3] = colours
+        lit = (np.asarray(colours) != self._resting).any(axis=1, keepdims=True)
+        self._model.geom_rgba[self._lamps, :3] = np.where(lit, colours, LAMP_OFF)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
         mujoco.mjv_updateScene(

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.world.figures import BLACK, KEYS
+from pianomime.world.figures import BLACK, KEYS, key_centres
 
 CAMERAS = ("player", "top", "side")
 """Names of the cameras: over the player's shoulders, straight down, from the treble end."""
@@ -21,6 +21,7 @@ CAMERAS = ("player", "top", "side")
 WHITE_KEY = (0.93, 0.92, 0.89)
 BLACK_KEY = (0.07, 0.07, 0.08)
 PRESSED_KEY = (0.25, 0.78, 0.42)
+LAMP_OFF = (0.07, 0.07, 0.08)
 """Colours (red, green, blue), 0..1."""
 
 # The same two hues tell the hands apart in every picture of a performance.
@@ -84,6 +85,7 @@ def dress(spec: mujoco.MjSpec) -> None:
     _set_up_rendering(spec)
     _add_materials(spec)
     _add_stage(spec)
+    _add_lamps(spec)
     _add_cameras(spec)
     for key in range(KEYS):
         spec.geom(f"key_{key}").material = "black_key" if BLACK[key] else "white_key"
@@ -105,7 +107,7 @@ def _set_up_rendering(spec: mujoco.MjSpec) -> None:
     visual = spec.visual
     visual.global_.offwidth, visual.global_.offheight = 3840, 2160
     # Enough for this scene, and what software OpenGL draws in reasonable time.
-    visual.quality.shadowsize = 1024
+    visual.quality.shadowsize = 2048
     visual.quality.offsamples = 4
     visual.quality.numslices, visual.quality.numstacks = 20, 10
     visual.map.znear, visual.map.zfar = 0.1, 4.0
@@ -123,6 +125,7 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         ("white_key", WHITE_KEY, 0.25, 0.6),
         ("black_key", BLACK_KEY, 0.5, 0.7),
         ("lacquer", (0.035, 0.035, 0.042), 0.6, 0.8),
+        ("lamp", LAMP_OFF, 0.1, 0.1),
         ("felt", (0.36, 0.06, 0.09), 0.0, 0.0),
         ("stage", (0.17, 0.18, 0.21), 0.05, 0.1),
         ("shell", (0.80, 0.82, 0.85), 0.35, 0.5),
@@ -178,6 +181,23 @@ def _add_stage(spec: mujoco.MjSpec) -> None:
             pos=pos,
             size=half_size,
             material=material,
+            contype=0,
+            conaffinity=0,
+        )
+
+
+def _add_lamps(spec: mujoco.MjSpec) -> None:
+    """A lamp behind each key, which shows what is pressed where a hand hides the key itself."""
+    base = spec.geom("piano_base")
+    front, top = base.pos[0] + base.size[0], base.pos[2] + base.size[2]
+    for key, (_, y, _) in enumerate(key_centres()):
+        spec.worldbody.add_geom(
+            name=f"lamp_{key}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            # Lamps of black keys sit a little further back, so that neighbours stay apart.
+            pos=(front - (0.024 if BLACK[key] else 0.011), y, top),
+            size=(0.005, 0.005, 0.0005),
+            material="lamp",
             contype=0,
             conaffinity=0,
         )

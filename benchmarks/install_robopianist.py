@@ -1,0 +1,73 @@
+"""Make an environment in which RoboPianist 1.0.10 runs, for `speed_world.py` to compare with.
+
+RoboPianist asks for PyAudio and pyfluidsynth, which build on system libraries (PortAudio,
+FluidSynth) and serve only to play sound aloud. Two empty modules of ours stand in for them;
+nothing else of RoboPianist is touched.
+
+    python benchmarks/install_robopianist.py [--environment .cache/robopianist]
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+DEPENDENCIES = (
+    "mujoco==3.3.7",
+    "dm_control==1.0.34",
+    "dm-env-wrappers==0.0.13",
+    "mujoco-utils==0.0.6",
+    "note-seq==0.0.5",
+    "numpy==2.4.6",
+    "pretty_midi==0.2.11.post0",
+    "scikit-learn==1.9.1",
+    "scipy==1.17.1",
+    "termcolor==3.3.0",
+    "tqdm==4.70.1",
+)
+# Without its own requirements, because they name the two sound libraries.
+ROBOPIANIST = "robopianist==1.0.10"
+STAND_INS = ("pyaudio", "fluidsynth")
+STAND_IN = '"""Stands in for a sound library that needs system packages; nothing here plays."""\n'
+CHECK = """
+from robopianist import suite
+environment = suite.load("RoboPianist-debug-TwinkleTwinkleRousseau-v0")
+environment.reset()
+environment.step(environment.action_spec().generate_value())
+"""
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument("--environment", type=Path, default=ROOT / ".cache" / "robopianist")
+    folder: Path = options.parse_args().environment
+    if sys.version_info >= (3, 13):
+        # note-seq needs pydub, which imports a module that Python 3.13 has dropped.
+        print("RoboPianist needs Python 3.11 or 3.12: run this script with one of them")
+        return 2
+    venv.create(folder, with_pip=True)
+    python = folder / "bin" / "python"
+    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, *DEPENDENCIES], check=True)
+    subprocess.run([*pip, "--no-deps", ROBOPIANIST], check=True)
+    where = subprocess.run(
+        [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    for name in STAND_INS:
+        Path(where.stdout.strip(), f"{name}.py").write_text(STAND_IN, "utf-8")
+    subprocess.run([str(python), "-W", "ignore", "-c", CHECK], check=True)
+    print(f"RoboPianist runs: {python}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,91 @@
+"""What a tracker costs a frame: the paper's IK, and IK with inverse dynamics.
+
+The zero-shot planner's fingertips for a bundled song are tracked in a World, on one core. Timed
+are `begin`, shared out over the frames, and every `control`; the World's own steps are not.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import common
+from pianomime.music import Score
+from pianomime.plan import FingertipPlan, ZeroShotPlanner
+from pianomime.play import excerpt
+from pianomime.song_files import find_song
+from pianomime.track import DynamicTracker, IkTracker, Tracker
+from pianomime.world import World
+from pianomime.world.figures import CONTROL_DT
+
+TRACKERS: dict[str, Callable[[], Tracker]] = {"ik": IkTracker, "dynamic": DynamicTracker}
+
+
+def measure(tracker: Tracker, plan: FingertipPlan) -> dict[str, float]:
+    """Milliseconds a frame of one tracker."""
+    world = World()
+    start = time.perf_counter()
+    tracker.begin(plan)
+    begin = time.perf_counter() - start
+    control = np.empty(len(plan))
+    for frame in range(len(plan)):
+        start = time.perf_counter()
+        ctrl = tracker.control(frame, world)
+        control[frame] = time.perf_counter() - start
+        world.step(ctrl)
+    each = begin / len(plan) + control.mean()
+    return {
+        "begin_ms": 1e3 * begin / len(plan),
+        "control_ms_median": 1e3 * float(np.median(control)),
+        "control_ms_99": 1e3 * float(np.percentile(control, 99)),
+        "control_ms_slowest": 1e3 * float(control.max()),
+        "together_ms": 1e3 * each,
+        "realtime_factor": CONTROL_DT / each,
+    }
+
+
+def main() -> None:
+    options = common.parser("speed_ik", __doc__)
+    options.add_argument("--song", default="beethoven-fur-elise", help="bundled song or MIDI file")
+    options.add_argument("--rounds", type=int, default=5)
+    arguments = options.parse_args()
+    facts = common.machine()
+    common.show_machine(facts)
+    os.sched_setaffinity(0, {max(common.cores())})
+    plan = ZeroShotPlanner().plan(excerpt(Score.from_midi(find_song(arguments.song))))
+    runs: dict[str, list[dict[str, float]]] = {name: [] for name in TRACKERS}
+    for _ in range(arguments.rounds):
+        for name, make in TRACKERS.items():
+            runs[name].append(measure(make(), plan))
+    medians: dict[str, Any] = {
+        name: {figure: float(np.median([run[figure] for run in ran])) for figure in ran[0]}
+        for name, ran in runs.items()
+    }
+    print(
+        f"{arguments.song}: {len(plan)} frames, both hands, median of {arguments.rounds} rounds\n"
+    )
+    common.table(
+        (
+            "tracker",
+            "begin [ms/frame]",
+            "control, median [ms]",
+            "99 %",
+            "slowest",
+            "together [ms/frame]",
+            "times real time",
+        ),
+        [(name, *figures.values()) for name, figures in medians.items()],
+    )
+    common.report(
+        arguments.output,
+        facts,
+        {"song": arguments.song, "frames": len(plan), "median": medians, "rounds": runs},
+    )
+
+
+if __name__ == "__main__":
+    main()

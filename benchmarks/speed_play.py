@@ -1,0 +1,98 @@
+"""Time and memory of `pianomime play`, without the film, on one core.
+
+Every song is played by the command itself in a fresh process: peak memory and whole time are that
+process's own, with imports, sound and report; planning and simulating are what its report says.
+The real-time factor is song / (planning + simulating).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import common
+from pianomime import songs
+from pianomime.song_files import find_songs
+
+
+def play(song: Path, seconds: float, core: int) -> dict[str, Any]:
+    """The figures of one song, or its error."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder, "out")
+        start = time.perf_counter()
+        process = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "pianomime", "play", str(song), "-o", str(out)),
+                *("--no-video", "--seconds", str(seconds)),
+            ],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: os.sched_setaffinity(0, {core}),
+        )
+        assert process.stderr is not None
+        error = process.stderr.read()
+        # Unlike getrusage(RUSAGE_CHILDREN), this is the one process and not the largest so far.
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        took = time.perf_counter() - start
+        if process.returncode:
+            return {"song": song.stem, "error": error.strip().splitlines()[-1]}
+        row = json.loads((out / "report.json").read_text("utf-8"))
+    wanted = ("song", "song_seconds", "f1", "plan_seconds", "simulate_seconds", "realtime_factor")
+    return {
+        **{figure: row[figure] for figure in wanted},
+        "whole_seconds": took,
+        "peak_mib": usage.ru_maxrss / 1024,  # Linux counts KiB
+    }
+
+
+def main() -> None:
+    options = common.parser("speed_play", __doc__)
+    options.add_argument(
+        "songs", nargs="*", help="bundled songs, MIDI files or folders (all bundled songs)"
+    )
+    options.add_argument("--seconds", type=float, default=30.0, help="of each song (%(default)s)")
+    options.add_argument("--rounds", type=int, default=1)
+    arguments = options.parse_args()
+    facts = common.machine()
+    common.show_machine(facts)
+    core = max(common.cores())
+    files = find_songs(arguments.songs or songs.names())
+    rows = []
+    for file in files:
+        runs = [play(file, arguments.seconds, core) for _ in range(arguments.rounds)]
+        failed = [run for run in runs if "error" in run]
+        rows.append(failed[0] if failed else _median(runs))
+        print(".", end="", flush=True)
+    print("\n")
+    played = [row for row in rows if "error" not in row]
+    figures = [name for name in played[0] if name != "song"] if played else []
+    lines = [(row["song"], *(row[name] for name in figures)) for row in played]
+    if played:
+        lines.append(("median", *(statistics.median(row[n] for row in played) for n in figures)))
+        lines.append(("lowest", *(min(row[name] for row in played) for name in figures)))
+        lines.append(("highest", *(max(row[name] for row in played) for name in figures)))
+    common.table(("song", *figures), lines)
+    for row in rows:
+        if "error" in row:
+            print(f"{row['song']}: {row['error']}")
+    common.report(arguments.output, facts, {"seconds": arguments.seconds, "songs": rows})
+
+
+def _median(runs: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        name: value if name == "song" else statistics.median(run[name] for run in runs)
+        for name, value in runs[0].items()
+    }
+
+
+if __name__ == "__main__":
+    main()
