@@ -39,23 +39,28 @@ def _colour(name: str, figure: str) -> Any:
 
 @cache
 def key_centres() -> np.ndarray:
-    """(88, 3) [m] world position of the middle of each key's box, at rest."""
+    """(88, 3) [m] world position of the middle of each key's box, at rest; read-only."""
     centre = np.empty((KEYS, 3))
     centre[:, 1] = FIGURES["keyboard"]["key_y"]
     for column, figure in ((0, "x"), (2, "z")):
         centre[:, column] = np.where(BLACK, _colour("black", figure), _colour("white", figure))
-    return centre
+    return _read_only(centre)
 
 
 @cache
 def key_half_sizes() -> np.ndarray:
-    """(88, 3) [m] half the length (x), width (y) and height (z) of each key."""
-    return np.where(
-        BLACK[:, None], _colour("black", "half_size"), _colour("white", "half_size")
-    ).astype(float)
+    """(88, 3) [m] half the length (x), width (y) and height (z) of each key; read-only."""
+    black, white = _colour("black", "half_size"), _colour("white", "half_size")
+    return _read_only(np.where(BLACK[:, None], black, white))
 
 
 @cache
 def key_travel() -> np.ndarray:
-    """(88,) [rad] angle of each key at its stop; 0 is at rest."""
-    return np.where(BLACK, _colour("black", "range")[1], _colour("white", "range")[1]).astype(float)
+    """(88,) [rad] angle of each key at its stop; 0 is at rest. Read-only."""
+    return _read_only(np.where(BLACK, _colour("black", "range")[1], _colour("white", "range")[1]))
+
+
+def _read_only(figures: np.ndarray) -> np.ndarray:
+    # One array serves all callers.
+    figures.setflags(write=False)
+    return figures

@@ -50,6 +50,10 @@ def build_spec() -> mujoco.MjSpec:
 @cache
 def world_model() -> mujoco.MjModel:
     """The compiled model of `build_spec`, compiled once; treat it as read-only."""
+    # World tells of broken physics itself; nobody wants MUJOCO_LOG.TXT beside their songs.
+    log = mujoco.MjLogConfig.get()
+    log.logto_file = False
+    log.set()
     return build_spec().compile()
 
 
@@ -177,9 +181,7 @@ def _empty_spec() -> mujoco.MjSpec:
     return spec
 
 
-def _add_joint(
-    body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float
-) -> None:
+def _add_joint(body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float) -> None:
     slide = figures.get("type") == "slide"
     x, y, z = figures["axis"]
     # Forearms slide along the same world axes on both sides; a mirrored hinge axis turns round.

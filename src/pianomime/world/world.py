@@ -8,31 +8,21 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.world.figures import (
-    FIGURES,
-    HAND_JOINTS,
-    KEYS,
-    LEFT_JOINTS,
-    RIGHT_JOINTS,
-    SUBSTEPS,
-    key_travel,
-)
+from pianomime.world.figures import SUBSTEPS
 from pianomime.world.model import fingertip_sites, world_model
-
-_RESETS = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
+from pianomime.world.moment import (
+    BLOW_UP,
+    RESETS,
+    STATE,
+    Moment,
+    PhysicsWarning,
+    clear_of_keys,
+    finite,
+    starting_positions,
 )
-PRESSED_WITHIN: float = FIGURES["keyboard"]["pressed_within"]
-"""[rad] A key counts as pressed this close to its stop."""
 
 
-class PhysicsWarning(RuntimeWarning):
-    """The simulation broke and was put back."""
-
-
-class World:
+class World(Moment):
     """Piano, two hands and the pedal. Deterministic: same controls, same states, bit for bit.
 
     Attributes:
@@ -63,14 +53,7 @@ class World:
         Raises:
             ValueError: if `qpos` has another shape or is not finite.
         """
-        start = np.zeros(self.model.nq)
-        if qpos is not None:
-            given = np.asarray(qpos, float)
-            if given.shape not in ((self.model.nq,), (2 * HAND_JOINTS,)):
-                raise ValueError(f"qpos must be (142,) or (54,), not {given.shape}")
-            if not np.isfinite(given).all():
-                raise ValueError("qpos holds values that are not finite")
-            start[-given.size :] = given
+        start = starting_positions(qpos)
         self.blow_ups = 0
         self.pedal = False
         self._put(start)
@@ -86,48 +69,50 @@ class World:
         Raises:
             ValueError: if `ctrl` has another shape or is not finite.
         """
-        wanted = np.asarray(ctrl, float)
-        if wanted.shape != (self.model.nu,):
-            raise ValueError(f"ctrl must be ({self.model.nu},), not {wanted.shape}")
-        if not np.isfinite(wanted).all():
-            raise ValueError("ctrl holds values that are not finite")
+        wanted = finite(ctrl, "ctrl", (self.model.nu,))
         before = self.data.qpos.copy()
         self.data.ctrl[:] = wanted
         self.pedal = bool(pedal)
         mujoco.mj_step(self.model, self.data, nstep=SUBSTEPS)
         if self._broken():
             self.blow_ups += 1
-            warnings.warn(
-                "the physics broke: hands opened above the keys where they were, keys up",
-                PhysicsWarning,
-                stacklevel=2,
-            )
-            self._put(_clear_of_keys(before))
+            warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=2)
+            self._put(clear_of_keys(before))
 
-    @property
-    def qpos(self) -> NDArray[np.float64]:
-        """(142,) positions: 88 keys, right hand 27, left hand 27 [rad, m]; a copy."""
-        return self.data.qpos.copy()
+    def state(self) -> NDArray[np.float64]:
+        """(S,) the moment as numbers, for `set_state` of any World or WorldBatch.
 
-    @property
-    def qpos_hands(self) -> NDArray[np.float64]:
-        """(54,) positions of the hands, right 27 then left 27 [rad, m]; a copy."""
-        return self.data.qpos[KEYS:].copy()
+        All that the physics goes on from, but for which keys sleep.
+        """
+        state = np.empty(mujoco.mj_stateSize(self.model, STATE))
+        mujoco.mj_getState(self.model, self.data, state, STATE)
+        return state
 
-    @property
-    def qvel_hands(self) -> NDArray[np.float64]:
-        """(54,) velocities of the hands, right 27 then left 27 [rad/s, m/s]; a copy."""
-        return self.data.qvel[KEYS:].copy()
+    def set_state(self, state: ArrayLike) -> None:
+        """Go to a moment that `state` gave; blow-ups are counted from here, the pedal is up.
 
-    @property
-    def key_state(self) -> NDArray[np.float64]:
-        """(88,) how far each key is down, 0..1."""
-        return key_state(self.data.qpos)
+        What follows is the same for every World and WorldBatch that goes there, bit for bit. It
+        may differ a little from what followed for the World that the state was taken from: keys
+        that slept there are awake here. `copy` does without that difference.
 
-    @property
-    def pressed(self) -> NDArray[np.bool_]:
-        """(88,) the keys that sound: within 0.5 degrees of their stop."""
-        return pressed(self.data.qpos)
+        Args:
+            state: (S,).
+
+        Raises:
+            ValueError: if `state` has another shape or is not finite.
+        """
+        given = finite(state, "state", (mujoco.mj_stateSize(self.model, STATE),))
+        self.blow_ups = 0
+        self.pedal = False
+        mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, given, STATE)
+
+    def copy(self) -> World:
+        """Another world in the same moment: it goes on as this one does, bit for bit."""
+        other = World()
+        mujoco.mj_copyData(other.data, self.model, self.data)
+        other.blow_ups, other.pedal = self.blow_ups, self.pedal
+        return other
 
     @property
     def fingertips(self) -> NDArray[np.float64]:
@@ -136,6 +121,14 @@ class World:
         tips: NDArray[np.float64] = self.data.site_xpos[self._tips]
         return tips
 
+    def _positions(self) -> NDArray[np.float64]:
+        positions: NDArray[np.float64] = self.data.qpos
+        return positions
+
+    def _velocities(self) -> NDArray[np.float64]:
+        velocities: NDArray[np.float64] = self.data.qvel
+        return velocities
+
     def _put(self, qpos: NDArray[np.float64]) -> None:
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:] = qpos
@@ -143,27 +136,6 @@ class World:
 
     def _broken(self) -> bool:
         return bool(
-            any(self.data.warning[int(kind)].number for kind in _RESETS)
+            any(self.data.warning[kind].number for kind in RESETS)
             or not np.isfinite(self.data.qpos).all()
         )
-
-
-def _clear_of_keys(qpos: NDArray[np.float64]) -> NDArray[np.float64]:
-    opened = np.zeros_like(qpos)
-    along = [RIGHT_JOINTS.start, LEFT_JOINTS.start]
-    opened[along] = qpos[along]
-    return opened
-
-
-def key_state(qpos: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far keys are down, 0..1: (..., 88) from positions (..., 142)."""
-    down: NDArray[np.float64] = np.clip(qpos[..., :KEYS] / key_travel(), 0.0, 1.0)
-    return down
-
-
-def pressed(qpos: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which keys sound: (..., 88) bool from positions (..., 142)."""
-    travel = key_travel()
-    short = travel - np.clip(qpos[..., :KEYS], 0.0, travel)
-    sounds: NDArray[np.bool_] = short <= PRESSED_WITHIN
-    return sounds
