@@ -119,9 +119,7 @@ class _Beam:
         note (B, M): 0..4 left thumb to little, 5..9 right, -1 not played.
         """
         options, pairs = _options(len(keys))
-        sides = [
-            self._hand_cost(side, onset, keys, options, config) for side in (LEFT, RIGHT)
-        ]
+        sides = [self._hand_cost(side, onset, keys, options, config) for side in (LEFT, RIGHT)]
         (left, left_centre), (right, right_centre) = sides
         played = (options[pairs[:, 0]] >= 0) | (options[pairs[:, 1]] >= 0)
         dropped = ~played @ (config.drop + config.drop_frame * (ends - onset))

@@ -25,7 +25,9 @@ class ZeroShotConfig:
     """The zero-shot planner."""
 
     fingering: FingeringConfig = field(default_factory=FingeringConfig)
-    path: PathConfig = field(default_factory=PathConfig)
+    path: PathConfig = field(
+        default_factory=lambda: PathConfig(joint_acceleration=150.0, slide_acceleration=20.0)
+    )
     hover: float = 0.010
     """[m] that idle fingertips stay above the keys."""
     approach: float = 0.004
@@ -81,9 +83,7 @@ class ZeroShotPlanner:
                         break
                     targets[frame, finger + 1] = point + [0, 0, self.config.approach * lead]
                     weights[frame, finger + 1] = 1 / (np.array([0.01, 0.003, 0.003]) * lead)
-                    clearance[frame, finger] = min(
-                        self.config.hover, self.config.approach * lead
-                    )
+                    clearance[frame, finger] = min(self.config.hover, self.config.approach * lead)
                 if end < frames and finger_key[end, finger] == NO_KEY:
                     targets[end, finger + 1] = point + [0, 0, self.config.lift]
                     weights[end, finger + 1] = 1 / np.array([0.01, 0.004, 0.002])

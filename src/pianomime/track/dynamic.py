@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pianomime.plan import FingertipPlan
 from pianomime.plan.joint_path import BLACK_REST, WHITE_REST, PathConfig, smooth_path
 from pianomime.world import World
-from pianomime.world.figures import BLACK, CONTROL_DT
+from pianomime.world.figures import BLACK, CONTROL_DT, key_centres
 from pianomime.world.hand import SIDES, Hand
 
 
@@ -25,12 +25,16 @@ class DynamicConfig:
     """The dynamic tracker."""
 
     path: PathConfig = field(default_factory=PathConfig)
-    depth: float = 0.009
+    depth: float = 0.018
     """[m] below the resting key's top that a pressing fingertip aims."""
-    force: float = 2.0
+    force: float = 5.0
     """[N] downward on a pressed key."""
     feedback: float = 0.5
     """Share of the joint error that is added to the control."""
+    astray: float = 0.009
+    """[m] beside its key from where a fingertip must not press."""
+    clear: float = 0.005
+    """[m] above the keys that a fingertip gone astray is lifted."""
 
 
 class DynamicTracker:
@@ -43,8 +47,10 @@ class DynamicTracker:
     def begin(self, plan: FingertipPlan) -> None:
         """Work out the joint paths and the controls that follow them, from the rest pose."""
         start = World().qpos
+        self._finger_key = plan.finger_key
         self._paths = []
         self._feedforward = np.empty((len(plan), 46))
+        self._press = []
         for index, hand in enumerate(self._hands):
             pressing = plan.finger_key[:, index] >= 0
             targets, weights = self._wishes(plan.fingertips[:, index], plan.finger_key[:, index])
@@ -54,19 +60,44 @@ class DynamicTracker:
             )
             self._paths.append(path)
             torque = motion_torque(hand, path)
-            torque += self.config.force * press_torque(hand, path[1:], pressing)
+            press = self.config.force * press_torque(hand, path[1:], pressing)
+            self._press.append(to_actuators(hand, press) / hand.gain)
             middle = (path[1:] + path[:-1]) / 2
             ctrl = middle @ hand.to_ctrl.T + to_actuators(hand, torque) / hand.gain
-            self._feedforward[:, hand.actuators] = np.clip(ctrl, hand.ctrl_low, hand.ctrl_high)
+            self._feedforward[:, hand.actuators] = ctrl
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """(46,) right then left: feed-forward plus a share of the present joint error."""
+        """(46,) right then left: feed-forward plus a share of the present joint error.
+
+        A finger that is not over the key it is to press would press, or be caught by, another
+        one: it is lifted above the keys until it has come across.
+        """
         ctrl = self._feedforward[frame].copy()
         qpos = world.qpos
-        for hand, path in zip(self._hands, self._paths, strict=True):
-            error = hand.to_ctrl @ (path[frame] - qpos[hand.joints])
-            ctrl[hand.actuators] += self.config.feedback * error
+        for index, hand in enumerate(self._hands):
+            here = qpos[hand.joints]
+            wanted = self._paths[index][frame] - here
+            correction = self.config.feedback * (hand.to_ctrl @ wanted)
+            keys = self._finger_key[frame, index]
+            points, jacobian = hand.points_and_jacobian(here)
+            beside = np.abs(points[1:, 1] - key_centres()[keys, 1])
+            astray = (keys >= 0) & (beside > self.config.astray)
+            press = self._press[index][frame]
+            ctrl[hand.actuators] += correction + press[~astray].sum(axis=0)
+            ctrl[hand.actuators] += hand.to_ctrl @ self._lift(jacobian[1:, 2], astray)
         return ctrl
+
+    def _lift(
+        self, upward: NDArray[np.float64], astray: NDArray[np.bool_]
+    ) -> NDArray[np.float64]:
+        """(27,) joint displacement that lifts fingers by their own joints."""
+        lift = np.zeros(upward.shape[1])
+        height = self.config.depth + self.config.clear
+        for finger in np.flatnonzero(astray):
+            own = upward[finger].copy()
+            own[:5] = 0.0
+            lift += own * height / (own @ own + 1e-4)
+        return lift
 
     def _wishes(
         self, points: NDArray[np.float64], finger_key: NDArray[np.int8]
@@ -106,11 +137,11 @@ def motion_torque(hand: Hand, path: NDArray[np.float64]) -> NDArray[np.float64]:
 def press_torque(
     hand: Hand, path: NDArray[np.float64], pressing: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """(T, 27) [N m, N] torque that pushes pressing fingertips (T, 5) down with 1 N each."""
-    torque = np.zeros_like(path)
+    """(T, 5, 27) [N m, N] torque with which each pressing fingertip (T, 5) pushes down 1 N."""
+    torque = np.zeros((*pressing.shape, path.shape[1]))
     for frame in np.flatnonzero(pressing.any(axis=1)):
         _, jacobian = hand.points_and_jacobian(path[frame])
-        torque[frame] = -jacobian[1:, 2][pressing[frame]].sum(axis=0)
+        torque[frame][pressing[frame]] = -jacobian[1:, 2][pressing[frame]]
     return torque
 
 
