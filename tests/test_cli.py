@@ -58,7 +58,8 @@ def test_every_command_has_help_with_examples(
     with pytest.raises(SystemExit) as stopped:
         main([command, "--help"])
     assert stopped.value.code == 0
-    assert f"pianomime {command}" in capsys.readouterr().out
+    _, examples = capsys.readouterr().out.split("Examples:\n")
+    assert f"\n  pianomime {command}" in "\n" + examples
 
 
 def test_the_module_can_be_run() -> None:

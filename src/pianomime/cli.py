@@ -7,6 +7,7 @@ what the user gave is one line on stderr and exit code 2; Ctrl-C is exit code 13
 from __future__ import annotations
 
 import importlib
+import inspect
 import os
 import sys
 import warnings
@@ -106,7 +107,9 @@ def _run(arguments: list[str]) -> None:
         import tyro
 
         module, config, _ = COMMANDS[name]
+        kind = getattr(importlib.import_module(module), config)
+        # Given in full: left to itself, tyro leaves out the examples.
         command: Runnable = tyro.cli(
-            getattr(importlib.import_module(module), config), prog=f"pianomime {name}", args=rest
+            kind, prog=f"pianomime {name}", description=inspect.cleandoc(kind.__doc__), args=rest
         )
         command.run()

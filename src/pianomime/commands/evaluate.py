@@ -22,15 +22,15 @@ class Evaluate:
       pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
     """
 
-    paths: tyro.conf.Positional[tuple[str, ...]]
+    paths: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="PATH...")]
     """MIDI files, folders of them, or names of bundled songs."""
-    player: str = "zero-shot"
+    player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
     """Name of the player."""
-    seconds: float = 30.0
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much of each song to play at most, from its first note [s]."""
-    jobs: int | None = None
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Songs played at the same time; one a core if not given."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the results; out/evaluate-PLAYER if not given."""
 
     def run(self) -> None:

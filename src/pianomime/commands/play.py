@@ -27,15 +27,15 @@ class Play:
       pianomime play SONG.mid --start 60 --seconds 180
     """
 
-    song: tyro.conf.Positional[str]
+    song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
     """A MIDI file, or the name of a bundled song (see `pianomime songs`)."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the report; out/NAME if not given."""
-    player: str = "zero-shot"
+    player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
     """Name of the player."""
-    seconds: float = 30.0
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much to play at most, from the first note at or after START [s]."""
-    start: float = 0.0
+    start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in the song to begin [s]."""
     video: bool = True
     """Render a film, where this machine can."""

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Songs:
-    """List the bundled songs, to be played by name: `pianomime play fur-elise`."""
+    """List the bundled songs.
+
+    They can be played by name, or by a part of it.
+
+    Examples:
+      pianomime songs
+      pianomime play fur-elise
+    """
 
     def run(self) -> None:
         """Print one name a line."""
