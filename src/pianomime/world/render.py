@@ -26,7 +26,12 @@ FILM_SIZE = (1280, 544)
 """Width and height of a film [pixels]: the keyboard is long."""
 
 _MAX_GEOMS = 1000
+# Smooth edges come from drawing larger and shrinking: with OpenGL in software, half as dear as
+# letting it take several samples a pixel.
+_FILM_OVERSIZE = 1.5
+_PICTURE_OVERSIZE = 2.0
 _SILENCED = ("disable", "disabled", "off", "false", "0")
+_SHRINKING = av.video.reformatter.Interpolation.AREA
 _PROBE = """
 import importlib, sys, mujoco
 context = importlib.import_module("mujoco." + sys.argv[1]).GLContext(64, 64)
@@ -159,8 +164,10 @@ def render_frame(
     Raises:
         RenderUnavailable: where there is no working OpenGL.
     """
-    with Painter(width, height, camera) as painter:
-        return painter.paint(qpos, key_colours(pressed))
+    with Painter(*_oversize((width, height), _PICTURE_OVERSIZE), camera) as painter:
+        large = _video_frame(painter.paint(qpos, key_colours(pressed)))
+    small = large.reformat(width, height, "rgb24", interpolation=_SHRINKING)
+    return np.asarray(small.to_ndarray(), np.uint8)
 
 
 def write_video(
@@ -209,7 +216,7 @@ def write_video(
     if size[0] % 2 or size[1] % 2:
         raise ValueError(f"H.264 films have even sizes, not {size[0]}x{size[1]}")
     with (
-        Painter(*size, camera) as painter,
+        Painter(*_oversize(size, _FILM_OVERSIZE), camera) as painter,
         atomic(path) as temporary,
         # An index at the front lets a browser start before it has the whole film.
         av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as film,
@@ -223,8 +230,8 @@ def write_video(
             sound_stream = film.add_stream("aac", rate=sample_rate, layout="stereo")
         for frame in range(frames):
             shown = key_colours(pressed[frame]) if colours is None else colours[frame]
-            picture = av.VideoFrame.from_ndarray(
-                np.ascontiguousarray(painter.paint(qpos[frame], shown)), format="rgb24"
+            picture = _video_frame(painter.paint(qpos[frame], shown)).reformat(
+                *size, "yuv420p", interpolation=_SHRINKING
             )
             picture.pts, picture.time_base = frame, Fraction(1, fps)
             film.mux(picture_stream.encode(picture))
@@ -237,6 +244,15 @@ def write_video(
         for stream in (picture_stream, sound_stream):
             if stream is not None:
                 film.mux(stream.encode(None))
+
+
+def _oversize(size: tuple[int, int], factor: float) -> tuple[int, int]:
+    width, height = size
+    return round(factor * width), round(factor * height)
+
+
+def _video_frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
+    return av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
 
 
 def _sound(audio: NDArray[np.float32], start: int, end: int, sample_rate: int) -> av.AudioFrame:
