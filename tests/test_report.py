@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import io
 import json
 import os
 from html.parser import HTMLParser
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from matplotlib.image import imread
@@ -104,10 +106,6 @@ def test_an_hour_is_drawn_too(tmp_path: Path) -> None:
 
 
 def test_mp3_has_the_length_of_the_sound() -> None:
-    import io
-
-    import av
-
     seconds = 2.0
     sound = np.sin(np.arange(int(44100 * seconds))[:, None] * 0.06 * np.ones(2)).astype(np.float32)
     with av.open(io.BytesIO(mp3(sound, 44100))) as file:
@@ -154,3 +152,15 @@ def test_a_file_is_no_place_for_a_folder(tmp_path: Path) -> None:
     for out in (tmp_path / "file", tmp_path / "file" / "below"):
         with pytest.raises(InputError, match="is a file"), staged(out, []):
             pytest.fail("should not get here")
+
+
+def test_a_film_is_made_where_there_is_opengl(tmp_path: Path) -> None:
+    performance = made_up.performance(made_up.score(notes=2, seconds=0.6))
+    notes: list[str] = []
+    write_report(performance, tmp_path, True, lambda *_: None, notes.append)
+    if notes:
+        pytest.skip(notes[0])
+    with av.open(str(tmp_path / "performance.mp4")) as film:
+        assert sum(1 for _ in film.decode(video=0)) == len(performance)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert sum(source.startswith("data:video/mp4") for source in Page(html).sources) == 1

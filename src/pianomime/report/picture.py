@@ -83,25 +83,26 @@ def draw(performance: Performance, path: str | os.PathLike[str], theme: Theme = 
     height = head + rows * row_height + foot
     figure = Figure(figsize=(12.0, height), dpi=110, facecolor=theme.paper)
     boxes = _boxes(performance, theme)
-    pedal = _runs(performance.pedal[:, None])
+    pedal = _corners(performance.pedal[:, None])
+    pedal[..., 1] += low - 3.1  # a strip below the keys
+    boxes.append((pedal, theme.hands[_NOBODY], theme.hands[_NOBODY]))
     for row in range(rows):
         bottom = height - head - (row + 1) * row_height + 0.35
         axes = figure.add_axes(
             (0.055, bottom / height, 0.925, (row_height - 0.35) / height), facecolor=theme.paper
         )
         _paper(axes, low, high, theme)
+        begin, end = row * row_seconds, (row + 1) * row_seconds
         for corners, colour, edge in boxes:
-            rectangles = PolyCollection(corners, facecolors=colour, edgecolors=edge, linewidths=0.7)
+            here = corners[(corners[:, 0, 0] < end) & (corners[:, 2, 0] > begin)]
+            rectangles = PolyCollection(
+                list(here), facecolors=colour, edgecolors=edge, linewidths=0.7
+            )
             axes.add_collection(rectangles)
             rectangles.set_zorder(3)  # above the line of each C
-        for start, end, _ in pedal:
-            axes.fill_between(
-                [start / FRAMES_A_SECOND, end / FRAMES_A_SECOND],
-                low - 3.0, low - 2.2, color=theme.faint_text, linewidth=0, alpha=0.7,
-            )  # fmt: skip
         for frame in performance.blow_ups:
             axes.axvline(frame / FRAMES_A_SECOND, color=theme.wrong, linewidth=0.8, linestyle=":")
-        axes.set_xlim(row * row_seconds, (row + 1) * row_seconds)
+        axes.set_xlim(begin, end)
         axes.set_ylim(low - 3.2, high + 1)
     figure.axes[-1].set_xlabel("seconds", color=theme.faint_text, fontsize=9)
     _heading(figure, performance, height, theme)
@@ -126,9 +127,7 @@ def _runs(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.stack([start, end, column], axis=1)
 
 
-def _boxes(
-    performance: Performance, theme: Theme
-) -> list[tuple[list[NDArray[np.float64]], str, str]]:
+def _boxes(performance: Performance, theme: Theme) -> list[tuple[NDArray[np.float64], str, str]]:
     """Rectangles, their colour and that of their edge, from the bottom layer to the top one."""
     wanted = performance.score.roll()
     hand = _hand_of_cell(performance)
@@ -142,13 +141,13 @@ def _boxes(
     return boxes
 
 
-def _corners(cells: NDArray[np.bool_]) -> list[NDArray[np.float64]]:
-    """(4, 2) corners [s, keys] of the rectangle of each unbroken run of true cells (T, 88)."""
+def _corners(cells: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(M, 4, 2) corners [s, keys] of the rectangle of each unbroken run of true cells (T, 88)."""
     runs = _runs(cells)
     start, end = runs[:, 0] / FRAMES_A_SECOND, runs[:, 1] / FRAMES_A_SECOND
     low, high = runs[:, 2] + 0.08, runs[:, 2] + 0.92
     corners = np.stack([start, low, start, high, end, high, end, low], axis=1)
-    return list(corners.reshape(-1, 4, 2))
+    return corners.reshape(-1, 4, 2)
 
 
 def _hand_of_cell(performance: Performance) -> NDArray[np.int8]:
@@ -210,7 +209,7 @@ def _heading(figure: Figure, performance: Performance, height: float, theme: The
     if performance.plan is None or performance.dropped_notes:
         entries.append(box(theme.wanted[_NOBODY], theme.hands[_NOBODY], "given to no hand"))
     if performance.pedal.any():
-        entries.append(Line2D([], [], color=theme.faint_text, linewidth=3, label="pedal"))
+        entries.append(Line2D([], [], color=theme.hands[_NOBODY], linewidth=4, label="pedal"))
     if len(performance.blow_ups):
         entries.append(
             Line2D([], [], color=theme.wrong, linewidth=1, linestyle=":", label="physics broke")

@@ -28,8 +28,8 @@ FILES = (
 )
 """Every file that a report may consist of; the film is the only one that may be missing."""
 
-SAMPLE_RATE = 44100
-"""Of all sound in a report [Hz]."""
+SAMPLE_RATE = 48_000
+"""Of all sound in a report [Hz]: what the synthesizer gives without conversion."""
 
 
 def write_report(
