@@ -193,7 +193,8 @@ class _Beam:
         )
         cost += ((moved / idle[:, None] / config.hop_speed) ** 2).sum(axis=2)
         comfort = config.weak_finger * struck[:, 3:].sum(axis=1)
-        comfort = comfort + config.thumb_on_black * (struck[:, 0] & BLACK[strikes[:, 0]])
+        thumb_on_black = struck[:, 0] & BLACK[strikes[:, 0]]
+        comfort = comfort + config.thumb_on_black * thumb_on_black
         cost += comfort
         return np.where(clash, np.inf, cost), centre
 

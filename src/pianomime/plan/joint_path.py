@@ -177,7 +177,7 @@ def _step(
     ties[2, -2:, 0] = 0.0
     for lag in range(3):
         band[lag * HAND_JOINTS] += ties[lag] * stiffness
-    step = solveh_banded(
+    step: NDArray[np.float64] = solveh_banded(
         band.reshape(2 * HAND_JOINTS + 1, -1),
         -gradient.ravel(),
         lower=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +107,6 @@ def _presses(keys: NDArray[np.int8]) -> list[tuple[int, int, int]]:
     edges = np.flatnonzero(np.diff(keys, prepend=NO_KEY, append=NO_KEY))
     return [
         (int(first), int(end), int(keys[first]))
-        for first, end in zip(edges[:-1], edges[1:], strict=True)
+        for first, end in pairwise(edges)
         if keys[first] != NO_KEY
     ]

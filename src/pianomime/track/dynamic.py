@@ -14,10 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.plan import FingertipPlan
-from pianomime.plan.joint_path import BLACK_REST, WHITE_REST, PathConfig, smooth_path
+from pianomime.plan.joint_path import (
+    BLACK_REST,
+    WHITE_REST,
+    PathConfig,
+    resting_height,
+    smooth_path,
+)
 from pianomime.world import World
 from pianomime.world.figures import BLACK, CONTROL_DT, key_centres
 from pianomime.world.hand import SIDES, Hand
+
+# Forearm slides and wrist, the first joints of a hand.
+_ARM_JOINTS = 5
+# [m] Lifts of a fingertip per radian that count as nothing.
+_LIFT_DAMPING = 0.01
 
 
 @dataclass(frozen=True)
@@ -29,12 +40,20 @@ class DynamicConfig:
     """[m] below the resting key's top that a pressing fingertip aims."""
     force: float = 5.0
     """[N] downward on a pressed key."""
-    feedback: float = 0.5
+    joint_feedback: float = 0.5
     """Share of the joint error that is added to the control."""
+    tip_feedback: float = 0.5
+    """Share of each fingertip's error that its own joints are sent to make good."""
+    tip_damping: float = 0.03
+    """[m] Moves of a fingertip per radian that count as nothing, in that."""
+    tip_error: float = 0.02
+    """[m] Error of a fingertip that is made good at most."""
     astray: float = 0.009
     """[m] beside its key from where a fingertip must not press."""
+    sunk: float = 0.005
+    """[m] below the tops of the keys from where an idle fingertip must come up."""
     clear: float = 0.005
-    """[m] above the keys that a fingertip gone astray is lifted."""
+    """[m] above the keys that such fingertips are lifted."""
 
 
 class DynamicTracker:
@@ -49,6 +68,7 @@ class DynamicTracker:
         start = World().qpos
         self._finger_key = plan.finger_key
         self._paths = []
+        self._tips = []
         self._feedforward = np.empty((len(plan), 46))
         self._press = []
         for index, hand in enumerate(self._hands):
@@ -59,6 +79,7 @@ class DynamicTracker:
                 hand, start[hand.joints], targets, weights, clearance, self.config.path
             )
             self._paths.append(path)
+            self._tips.append(np.array([hand.points(pose)[1:] for pose in path]))
             torque = motion_torque(hand, path)
             press = self.config.force * press_torque(hand, path[1:], pressing)
             self._press.append(to_actuators(hand, press) / hand.gain)
@@ -67,36 +88,48 @@ class DynamicTracker:
             self._feedforward[:, hand.actuators] = ctrl
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """(46,) right then left: feed-forward plus a share of the present joint error.
+        """(46,) right then left: feed-forward, and a share of the present errors.
 
         A finger that is not over the key it is to press would press, or be caught by, another
-        one: it is lifted above the keys until it has come across.
+        one: it is lifted above the keys until it has come across. So is an idle finger that
+        has sunk between the keys.
         """
         ctrl = self._feedforward[frame].copy()
         qpos = world.qpos
         for index, hand in enumerate(self._hands):
             here = qpos[hand.joints]
-            wanted = self._paths[index][frame] - here
-            correction = self.config.feedback * (hand.to_ctrl @ wanted)
-            keys = self._finger_key[frame, index]
             points, jacobian = hand.points_and_jacobian(here)
-            beside = np.abs(points[1:, 1] - key_centres()[keys, 1])
-            astray = (keys >= 0) & (beside > self.config.astray)
-            press = self._press[index][frame]
-            ctrl[hand.actuators] += correction + press[~astray].sum(axis=0)
-            ctrl[hand.actuators] += hand.to_ctrl @ self._lift(jacobian[1:, 2], astray)
+            tips, jacobian = points[1:], jacobian[1:]
+            # A finger corrects itself: moving wrist or forearm would move all the others.
+            jacobian[..., :_ARM_JOINTS] = 0.0
+            keys = self._finger_key[frame, index]
+            beside = np.abs(tips[:, 1] - key_centres()[keys, 1]) > self.config.astray
+            low = tips[:, 2] < resting_height(tips[:, 0]) - self.config.sunk
+            lift = np.where(keys >= 0, beside, low)
+            move = self.config.joint_feedback * (self._paths[index][frame] - here)
+            move += self._reach(jacobian, self._tips[index][frame] - tips)
+            move += self._lift(jacobian[lift, 2])
+            press = self._press[index][frame][~lift].sum(axis=0)
+            ctrl[hand.actuators] += hand.to_ctrl @ move + press
         return ctrl
 
-    def _lift(
-        self, upward: NDArray[np.float64], astray: NDArray[np.bool_]
+    def _reach(
+        self, jacobian: NDArray[np.float64], error: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(27,) joint displacement that lifts fingers by their own joints."""
-        lift = np.zeros(upward.shape[1])
+        """(27,) joint displacement that makes good a share of the tips' errors (5, 3) [m]."""
+        size = np.linalg.norm(error, axis=1, keepdims=True)
+        error = error * np.minimum(1.0, self.config.tip_error / np.maximum(size, 1e-9))
+        gram = jacobian @ jacobian.transpose(0, 2, 1) + self.config.tip_damping**2 * np.eye(3)
+        force = np.linalg.solve(gram, error[..., None])
+        move: NDArray[np.float64] = (jacobian.transpose(0, 2, 1) @ force).sum(axis=0)[:, 0]
+        move *= self.config.tip_feedback
+        return move
+
+    def _lift(self, upward: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(27,) joint displacement that lifts fingers, given what their joints raise (F, 27)."""
         height = self.config.depth + self.config.clear
-        for finger in np.flatnonzero(astray):
-            own = upward[finger].copy()
-            own[:5] = 0.0
-            lift += own * height / (own @ own + 1e-4)
+        strength = (upward**2).sum(axis=1, keepdims=True) + _LIFT_DAMPING**2
+        lift: NDArray[np.float64] = (height * upward / strength).sum(axis=0)
         return lift
 
     def _wishes(

@@ -93,7 +93,8 @@ def bounded_least_squares(
         np.zeros(len(low), np.int32),
     )
     if status == 1:
-        return np.clip(solution * scale, low, high)
+        within: NDArray[np.float64] = np.clip(solution * scale, low, high)
+        return within
     from scipy.optimize import lsq_linear
 
     rows = np.vstack([jacobian, np.sqrt(damping) * np.eye(len(low))])
