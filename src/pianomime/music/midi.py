@@ -71,6 +71,12 @@ def read_midi(path: Path) -> Score:
 
 def write_midi(score: Score, path: Path) -> None:
     """See `Score.to_midi`."""
+    with atomic(path) as temporary:
+        temporary.write_bytes(midi_bytes(score))
+
+
+def midi_bytes(score: Score) -> bytes:
+    """The content of a MIDI file, see `Score.to_midi`."""
     import symusic
 
     rate = WRITTEN_TICKS_PER_BEAT * WRITTEN_BEATS_PER_MINUTE / 60
@@ -89,8 +95,8 @@ def write_midi(score: Score, path: Path) -> None:
     midi: Any = symusic.Score(WRITTEN_TICKS_PER_BEAT)
     midi.tempos.append(symusic.Tempo(0, WRITTEN_BEATS_PER_MINUTE))
     midi.tracks.append(piano)
-    with atomic(path) as temporary:
-        temporary.write_bytes(midi.dumps_midi())
+    content: bytes = midi.dumps_midi()
+    return content
 
 
 def _parse(path: Path) -> Any:

@@ -1,77 +1,70 @@
-"""The sound of a score: a small piano made of decaying partials, and WAV files.
+"""The sound of a score, on a sampled piano where there is one and a plain one elsewhere; WAV files.
 
-A sampled piano was tried first. The synthesizer of symusic 0.6 cannot return its sound to Python,
-that of 0.5 ignores the pedal and the velocity, and the free soundfonts are larger than the rest of
-PianoMime. This one hears pedal and velocity, is the same on every machine and needs only NumPy.
+The samples are those of the soundfont that the wheel of pretty_midi carries, the synthesizer is
+midirenderer's: both come with `pip install`, without a system library. (symusic, which reads our
+MIDI files, has a synthesizer too; that of 0.6 cannot return its sound to Python, and that of 0.5
+ignores pedal and velocity.)
 """
 
 from __future__ import annotations
 
+import io
 import os
+import warnings
 import wave
+from dataclasses import replace
+from importlib.util import find_spec
+from math import gcd
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.files import atomic
+from pianomime.music.midi import midi_bytes
 from pianomime.music.score import Score
 
+SAMPLE_RATE = 48_000
+"""The synthesizer's own [Hz]: any other costs a conversion."""
+
+MAX_SECONDS = 600.0
+"""Music beyond it is not made into sound: a song of three hours would take 4 GB."""
+
 PEAK = 0.9
-TAIL = 1.0
+TAIL = 1.5
 """Seconds left for the last note to fade."""
 
-FIRST_UNDAMPED_KEY = 69
-"""From F#6 up a piano has no dampers: these keys ring until they have faded."""
+RING = 10.0
+"""Seconds after which the pedal need not be held any longer: every string has faded."""
 
 
-def render_audio(score: Score, sample_rate: int = 44100) -> NDArray[np.float32]:
-    """Play a score on a synthetic piano.
+def render_audio(score: Score, sample_rate: int = SAMPLE_RATE) -> NDArray[np.float32]:
+    """Play a score on a grand piano.
 
-    Notes sound as long as their key or the sustain pedal is down, bass to the left.
+    Notes sound as long as their key or the sustain pedal is down.
 
     Args:
-        score: what to play.
+        score: what to play; all that is later than 10 minutes is left out, with a warning.
         sample_rate: samples a second.
 
     Returns:
         (S, 2) float32, left and right, the loudest sample at 0.9; silence for an empty score. It
-        lasts until the last note has been damped, and 1 s more.
+        lasts until the last note has been damped, and 1.5 s more.
     """
-    damped = _damped(score)
-    audio = np.zeros((round((damped.max(initial=0.0) + TAIL) * sample_rate), 2), np.float32)
-    strings: dict[int, tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
-    for key, onset, end, velocity in zip(
-        score.key.tolist(),
-        score.onset.tolist(),
-        damped.tolist(),
-        score.velocity.tolist(),
-        strict=True,
-    ):
-        if key not in strings:
-            strings[key] = _strings(key, sample_rate)
-        soft, hard = strings[key]
-        first = round(onset * sample_rate)
-        held = round((end - onset) * sample_rate)
-        fade = _fade(key, sample_rate)
-        count = min(len(soft), len(audio) - first)
-        if key < FIRST_UNDAMPED_KEY:
-            count = min(count, held + len(fade))
-        loudness = velocity / 127
-        # A harder blow is louder, and brighter.
-        note = loudness**1.5 * ((1 - loudness) * soft[:count] + loudness * hard[:count])
-        if key < FIRST_UNDAMPED_KEY and held < count:
-            note[held:] *= fade[: count - held]
-        pan = np.pi / 4 + (key - 43.5) / 43.5 * np.pi / 10
-        audio[first : first + count, 0] += np.cos(pan) * note
-        audio[first : first + count, 1] += np.sin(pan) * note
-    loudest = np.abs(audio).max(initial=0.0)
+    score = _audible(score)
+    end = _damped(score)
+    audio = np.zeros((round((end.max(initial=0.0) + TAIL) * sample_rate), 2), np.float32)
+    if len(score) and not _play_samples(score, sample_rate, audio):
+        _play_partials(score, end, sample_rate, audio)
+    loudest = max(audio.max(), -audio.min())
     if loudest > 0:
         audio *= PEAK / loudest
     return audio
 
 
 def write_wav(
-    path: str | os.PathLike[str], audio: NDArray[np.floating], sample_rate: int = 44100
+    path: str | os.PathLike[str], audio: NDArray[np.floating], sample_rate: int = SAMPLE_RATE
 ) -> None:
     """Write a 16-bit WAV file; samples beyond -1..1 are limited.
 
@@ -85,71 +78,111 @@ def write_wav(
     """
     if audio.ndim != 2:
         raise ValueError(f"audio must be (S, C), not {audio.shape}")
-    samples = np.rint(np.clip(audio, -1, 1) * 32767).astype("<i2")
     with atomic(path) as temporary, wave.open(str(temporary), "wb") as file:
-        file.setnchannels(samples.shape[1])
+        file.setnchannels(audio.shape[1])
         file.setsampwidth(2)
         file.setframerate(sample_rate)
-        file.writeframes(samples.tobytes())
+        # Second by second, because minutes of sound are large enough without copies.
+        for first in range(0, len(audio), sample_rate):
+            samples = np.clip(audio[first : first + sample_rate], -1, 1) * 32767
+            file.writeframes(np.rint(samples).astype("<i2").tobytes())
+
+
+def _audible(score: Score) -> Score:
+    """The score without what is too late to be rendered and pedal that holds only silence."""
+    if score.duration > MAX_SECONDS:
+        warnings.warn(
+            f"only the first {MAX_SECONDS / 60:.0f} of {score.duration / 60:.0f} minutes "
+            f"are made into sound",
+            stacklevel=2,
+        )
+    heard = score.onset < MAX_SECONDS
+    offset = np.minimum(score.offset[heard], MAX_SECONDS)
+    return replace(
+        score,
+        key=score.key[heard],
+        onset=score.onset[heard],
+        offset=offset,
+        velocity=score.velocity[heard],
+        pedal=np.minimum(score.pedal, offset.max(initial=0.0) + RING),
+    )
 
 
 def _damped(score: Score) -> NDArray[np.float64]:
-    """(N,) When the damper falls on each note [s]: key and pedal are up, or it is struck again."""
-    end = score.offset.copy()
-    for down, up in score.pedal.tolist():
-        end[(score.offset >= down) & (score.offset < up)] = up
-    order = np.lexsort((score.onset, score.key))
-    same_key = np.diff(score.key[order]) == 0
-    earlier, later = order[:-1][same_key], order[1:][same_key]
-    end[earlier] = np.minimum(end[earlier], score.onset[later])
-    return end
+    """(N,) When the damper falls on each note [s]: key and pedal are up."""
+    down, up = np.append(np.full((1, 2), -1.0), score.pedal, axis=0).T
+    at = np.searchsorted(down, score.offset, side="right") - 1
+    damped: NDArray[np.float64] = np.maximum(score.offset, up[at])
+    return damped
 
 
-def _strings(key: int, sample_rate: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """A key struck softly and struck hard, ringing until it has faded: two arrays of (S,).
+def _play_samples(score: Score, sample_rate: int, audio: NDArray[np.float32]) -> bool:
+    """Write the sound of a sampled piano into (S, 2), or return False where there is none."""
+    # Only located: importing pretty_midi takes longer than the music.
+    library = find_spec("pretty_midi")
+    if library is None or library.origin is None:
+        return False
+    # The synthesizer stops at the last event: one more move of the pedal, after all is silent.
+    end = len(audio) / sample_rate
+    longer = replace(score, pedal=np.append(score.pedal, [[end - 0.01, end]], axis=0))
+    try:
+        # Missing on platforms for which it has no wheel, and so is the soundfont from a source
+        # distribution of pretty_midi.
+        from midirenderer import render_wave_from
 
-    Stiff strings sound sharper the higher the partial (inharmonicity), high partials fade first,
-    and every partial fades fast at first and slowly later (the strings of a key drift apart).
+        soundfont = Path(library.origin).with_name("TimGM6mb.sf2").read_bytes()
+        samples, rate = _read_wav(render_wave_from(soundfont, midi_bytes(longer)))
+    except (ImportError, OSError, RuntimeError):
+        return False
+    if rate != sample_rate:
+        from scipy.signal import resample_poly
+
+        common = gcd(sample_rate, rate)
+        samples = resample_poly(samples.astype(np.float32), sample_rate // common, rate // common)
+    samples = samples[: len(audio)]
+    audio[: len(samples)] = samples
+    return True
+
+
+def _read_wav(content: bytes) -> tuple[NDArray[Any], int]:
+    """(S, 2) samples of 16 bits, and how many a second."""
+    with wave.open(io.BytesIO(content)) as file:
+        samples = np.frombuffer(file.readframes(file.getnframes()), "<i2")
+        return samples.reshape(-1, 2), file.getframerate()
+
+
+def _play_partials(
+    score: Score, end: NDArray[np.float64], sample_rate: int, audio: NDArray[np.float32]
+) -> None:
+    """Add the sound of a plain piano, six decaying partials a key, to (S, 2); bass to the left.
+
+    Args:
+        score: what to play.
+        end: (N,) when each note is damped [s].
+        sample_rate: samples a second.
+        audio: written to.
     """
-    pitch = 440.0 * 2 ** ((key - 48) / 12)
-    stiffness = 1.2e-4 * np.exp(0.065 * max(key - 24, 0))
-    ring = 5.0 * 2 ** (-key / 20)
-    samples = round(4 * ring * sample_rate)
-    soft, hard = np.zeros(samples, np.float32), np.zeros(samples, np.float32)
-    for partial in range(1, 25):
-        frequency = partial * pitch * np.sqrt(1 + stiffness * partial**2)
-        if partial > 1 and frequency > min(0.45 * sample_rate, 12_000):
-            break
-        decay = ring / (1 + 0.2 * (partial - 1))
-        count = min(samples, round(5 * decay * sample_rate))
-        turn = 2j * np.pi * frequency
-        # Golden-ratio phases: no two partials begin in step, so that there is no click.
-        begin = np.exp(2j * np.pi * 0.618 * partial)
-        fast = _powers(np.exp((turn - 3 / decay) / sample_rate), count)
-        slow = _powers(np.exp((turn - 1 / decay) / sample_rate), count)
-        sound = (np.complex64(0.6 * begin) * fast + np.complex64(0.4 * begin) * slow).imag
-        # The hammer strikes at one eighth of the string, where the eighth partial has a node.
-        strength = abs(np.sin(np.pi * partial / 8)) + 0.05
-        soft[:count] += np.float32(strength * partial**-2.0) * sound
-        hard[:count] += np.float32(strength * partial**-0.9) * sound
-    # The blow itself takes 2 ms, and what is left in the end is faded out; treble is softer.
-    shape = np.full(samples, 2 ** (-key / 60), np.float32)
-    blow, out = round(0.002 * sample_rate), samples // 10
-    shape[:blow] *= np.linspace(0, 1, blow, endpoint=False, dtype=np.float32)
-    shape[-out:] *= np.linspace(1, 0, out, dtype=np.float32)
-    return shape * soft / np.abs(soft).max(), shape * hard / np.abs(hard).max()
-
-
-def _powers(base: complex, count: int) -> NDArray[np.complex64]:
-    """base**0 .. base**(count-1), far faster than sines: blocks are multiples of the first one."""
-    block = 1024
-    within = (base ** np.arange(block)).astype(np.complex64)
-    blocks = (base ** (block * np.arange(count // block + 1))).astype(np.complex64)
-    return np.outer(blocks, within).ravel()[:count]
-
-
-def _fade(key: int, sample_rate: int) -> NDArray[np.float32]:
-    """What a falling damper leaves of the sound, sample by sample; bass strings take longer."""
-    seconds = 0.05 + 0.1 * (1 - key / 87)
-    time = np.arange(round(6 * seconds * sample_rate)) / sample_rate
-    return np.exp(-time / seconds).astype(np.float32)
+    release = np.exp(-np.arange(sample_rate // 2) / (0.08 * sample_rate)).astype(np.float32)
+    for key in np.unique(score.key).tolist():
+        pitch = 440.0 * 2 ** ((key - 48) / 12)
+        ring = 3.0 * 2 ** (-key / 24)
+        string = np.zeros(round(7 * ring * sample_rate), np.float32)
+        for partial in range(1, 7):
+            if partial * pitch < sample_rate / 2:
+                # High partials fade first, so they are over sooner.
+                time = np.arange(len(string) // partial) / sample_rate
+                decay = np.exp(-time * partial / ring) / partial**1.5
+                string[: len(time)] += decay * np.sin(2 * np.pi * partial * pitch * time)
+        place = np.pi / 4 + (key - 43.5) / 43.5 * np.pi / 10
+        sides = np.array([np.cos(place), np.sin(place)], np.float32)
+        notes = np.flatnonzero(score.key == key)
+        # A key that is struck again stops what it sounded before.
+        stop = np.minimum(end[notes], np.append(score.onset[notes[1:]], np.inf))
+        first = np.rint(score.onset[notes] * sample_rate).astype(int)
+        held = np.rint((stop - score.onset[notes]) * sample_rate).astype(int)
+        loudness = (score.velocity[notes] / 127) ** 2
+        for begin, length, gain in zip(first.tolist(), held.tolist(), loudness, strict=True):
+            note = np.float32(gain) * string[: length + len(release)]
+            note[length:] *= release[: len(note[length:])]
+            part = audio[begin : begin + len(note)]
+            part += note[: len(part), None] * sides

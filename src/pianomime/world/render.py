@@ -175,7 +175,7 @@ def write_video(
     qpos: NDArray[np.float64],
     pressed: NDArray[np.bool_],
     audio: NDArray[np.float32] | None,
-    sample_rate: int = 44100,
+    sample_rate: int = 48_000,
     fps: int = 20,
     progress: Callable[[int, int], None] | None = None,
     *,
