@@ -75,6 +75,7 @@ def add_piano(spec: mujoco.MjSpec) -> None:
         pos=figures["base"]["pos"],
         size=figures["base"]["half_size"],
         rgba=(0.15, 0.15, 0.15, 1.0),
+        mass=0.0,
         contype=0,
         conaffinity=0,
     )
