@@ -117,9 +117,12 @@ def test_harder_is_louder() -> None:
     assert loudness(audio, 1.5, 2.0) > 2 * loudness(audio, 0, 0.5)
 
 
-def test_bass_is_further_left_than_treble() -> None:
+def test_bass_is_on_the_left(kind: str) -> None:
+    if kind == "sampled":
+        pytest.skip("the samples are where the soundfont puts them")
     bass, treble = (np.abs(piano((key, 0, 1, 80))).sum(axis=0) for key in (0, 80))
-    assert bass[0] / bass[1] > 1.05 * treble[0] / treble[1]
+    assert bass[0] > bass[1]
+    assert treble[0] < treble[1]
 
 
 @pytest.mark.parametrize("pedal", [np.zeros((0, 2)), [[0.0, 1e6]]])

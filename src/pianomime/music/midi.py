@@ -5,7 +5,9 @@ hand it is the strict one (a file that is cut off or has bytes changed is an err
 zero-length notes, and it takes milliseconds where mido under pretty_midi takes seconds. Only its
 ticks are used. Its seconds are float32; here they are float64 and computed the way pretty_midi
 does, which decides on which side of a frame boundary a note falls and makes rolls equal to
-RoboPianist's cell for cell.
+RoboPianist's cell for cell. One difference is left: where a file lacks the end of a note, symusic
+leaves out the last note on that key, which pretty_midi rightly keeps (14 notes in all of 6 among
+114 real files, 138 of 257,390 roll cells).
 """
 
 from __future__ import annotations
