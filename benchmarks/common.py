@@ -8,7 +8,6 @@ import json
 import os
 import platform
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -68,7 +67,10 @@ def report(path: Path, facts: dict[str, Any], results: dict[str, Any]) -> None:
 
 
 def show_machine(facts: dict[str, Any]) -> None:
+    """Print the facts, and a warning where others are using the machine."""
     print("  ".join(f"{name}: {value}" for name, value in facts.items()), end="\n\n")
+    if facts["load_before"] > 0.5:
+        print("this machine is busy: timings will be too slow, and those on all cores say little\n")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
@@ -91,12 +93,6 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
     print(line(rules))
     for row in cells:
         print(line(row))
-
-
-def skip(reason: str) -> None:
-    """End a benchmark that cannot run here."""
-    print(f"skipped: {reason}")
-    sys.exit(0)
 
 
 def _cell(value: Any) -> str:
