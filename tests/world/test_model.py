@@ -50,7 +50,7 @@ def test_joint_order() -> None:
         *(f"{side}_{joint}" for side in SIDES for joint in JOINTS),
     ]
     assert (model.nq, model.nv) == (142, 142)
-    assert (RIGHT_JOINTS, LEFT_JOINTS) == (slice(88, 115), slice(115, 142))
+    assert (slice(88, 115), slice(115, 142)) == (RIGHT_JOINTS, LEFT_JOINTS)
 
 
 def test_actuator_order() -> None:

@@ -1,0 +1,194 @@
+"""Laws of the fingering: any music, each finger on one key, dropped notes counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from any_score import chord, melody, score_of, scores
+from pianomime.music import Score
+from pianomime.plan import LEFT, RIGHT
+from pianomime.plan import fingering as fingering_module
+from pianomime.plan.fingering import Fingering, find_fingering
+from pianomime.song_files import find_song
+from pianomime.world.figures import BLACK, key_centres
+
+MIRROR = 82
+"""Key k and key 82 - k are mirror images about D4: both black or both white."""
+
+
+def on_fingers(score: Score, fingering: Fingering) -> list[tuple[int, int, int, int]]:
+    """(hand, finger, key, first frame) of each played note that sounds at all."""
+    frames = score.note_frames()
+    return [
+        (int(hand), int(finger), int(key), int(first))
+        for hand, finger, key, (first, end) in zip(
+            fingering.hand, fingering.finger, score.key, frames, strict=True
+        )
+        if hand >= 0 and first < end
+    ]
+
+
+@settings(max_examples=60, deadline=None)
+@given(score=scores(most_notes=40))
+def test_any_score_gets_a_fingering(score: Score) -> None:
+    fingering = find_fingering(score)
+    assert fingering.hand.shape == fingering.finger.shape == (len(score),)
+    played = fingering.hand >= 0
+    assert set(fingering.hand.tolist()) <= {-1, LEFT, RIGHT}
+    assert ((fingering.finger[played] >= 0) & (fingering.finger[played] < 5)).all()
+    assert (fingering.finger[~played] == -1).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(score=scores(most_notes=40))
+def test_a_finger_strikes_one_key_at_a_time(score: Score) -> None:
+    struck: dict[tuple[int, int, int], int] = {}
+    for hand, finger, key, first in on_fingers(score, find_fingering(score)):
+        assert struck.setdefault((hand, finger, first), key) == key
+
+
+@settings(max_examples=60, deadline=None)
+@given(score=scores(most_notes=40))
+def test_a_key_is_struck_by_one_finger_at_a_time(score: Score) -> None:
+    struck: dict[tuple[int, int], tuple[int, int]] = {}
+    for hand, finger, key, first in on_fingers(score, find_fingering(score)):
+        assert struck.setdefault((key, first), (hand, finger)) == (hand, finger)
+
+
+@settings(max_examples=40, deadline=None)
+@given(keys=st.sets(st.integers(20, 66), min_size=1, max_size=9))
+def test_fingers_of_a_hand_do_not_cross_in_a_chord(keys: set[int]) -> None:
+    score = chord(sorted(keys))
+    fingering = find_fingering(score)
+    for hand, thumb_low in ((LEFT, False), (RIGHT, True)):
+        fingers = fingering.finger[fingering.hand == hand].astype(int)
+        assert (np.diff(fingers if thumb_low else -fingers) > 0).all()
+
+
+@pytest.mark.parametrize("notes", range(1, 25))
+def test_every_polyphony(notes: int) -> None:
+    score = chord(list(range(30, 30 + notes)))
+    fingering = find_fingering(score)
+    dropped = int((fingering.hand < 0).sum())
+    assert dropped >= max(0, notes - 10)
+    assert dropped < notes
+
+
+def test_all_keys_at_once() -> None:
+    fingering = find_fingering(chord(list(range(88))))
+    assert 0 < (fingering.hand >= 0).sum() <= 10
+
+
+@pytest.mark.parametrize("keys", [[0], [87], [0, 87], [39], [1, 86]])
+def test_single_notes_and_the_ends_of_the_keyboard(keys: list[int]) -> None:
+    fingering = find_fingering(chord(keys))
+    assert (fingering.hand >= 0).all()
+
+
+def test_a_triad_is_played_whole_by_hands_that_are_near() -> None:
+    fingering = find_fingering(chord([51, 55, 58]))
+    assert (fingering.hand == RIGHT).all()
+    fingering = find_fingering(chord([27, 31, 34]))
+    assert (fingering.hand == LEFT).all()
+
+
+def test_hands_share_what_is_far_apart() -> None:
+    fingering = find_fingering(chord([20, 27, 55, 62]))
+    np.testing.assert_array_equal(fingering.hand, [LEFT, LEFT, RIGHT, RIGHT])
+
+
+def test_a_stretch_beyond_ten_fingers_is_dropped_not_refused() -> None:
+    fingering = find_fingering(chord([0, 20, 44, 66, 87]))
+    assert 1 <= (fingering.hand < 0).sum() <= 3
+
+
+def test_two_voices_on_one_key_share_a_finger() -> None:
+    score = score_of((50, 4, 8), (50, 4, 12))
+    fingering = find_fingering(score)
+    played = on_fingers(score, fingering)
+    assert len({(hand, finger) for hand, finger, *_ in played}) == 1
+
+
+def test_no_notes() -> None:
+    empty = Score(np.array([], int), np.array([]), np.array([]), np.array([], int))
+    assert find_fingering(empty).hand.shape == (0,)
+
+
+def test_a_held_note_keeps_its_finger_busy() -> None:
+    score = score_of((51, 4, 40), (53, 10, 14), (55, 20, 24), (56, 30, 34))
+    fingering = find_fingering(score)
+    held = (fingering.hand[0], fingering.finger[0])
+    others = set(zip(fingering.hand[1:].tolist(), fingering.finger[1:].tolist(), strict=True))
+    assert held[0] >= 0
+    assert held not in others
+
+
+def test_the_keyboard_has_a_mirror() -> None:
+    keys = np.arange(MIRROR + 1)
+    np.testing.assert_array_equal(BLACK[keys], BLACK[MIRROR - keys])
+    along = key_centres()[:, 1]
+    middle = along[MIRROR // 2]
+    np.testing.assert_allclose(along[keys] - middle, middle - along[MIRROR - keys], atol=1.1e-3)
+
+
+@pytest.fixture
+def symmetric_keyboard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A keyboard whose mirror is exact, and in the middle between the resting hands."""
+    along = key_centres()[:, 1].copy()
+    keys = np.arange(MIRROR + 1)
+    along[keys] = (along[keys] - along[MIRROR - keys]) / 2
+    monkeypatch.setattr(fingering_module, "key_centres", lambda: along[:, None][:, [0, 0, 0]])
+
+
+@pytest.mark.usefixtures("symmetric_keyboard")
+@pytest.mark.parametrize(
+    "score",
+    [
+        melody([51, 53, 55, 56, 58]),
+        melody([39, 51, 43, 55, 46, 58]),
+        melody([31, 34, 39, 43, 46, 51]),
+        melody([44, 46, 48, 49]),
+        chord([27, 31, 34, 51, 55, 58]),
+        chord([51, 55, 58]),
+    ],
+)
+def test_mirrored_music_swaps_the_hands(score: Score) -> None:
+    """Law: the hands are alike, so a mirrored score is played with mirrored hands."""
+    mirrored_score = Score(MIRROR - score.key, score.onset, score.offset, score.velocity)
+    fingering, mirrored = find_fingering(score), find_fingering(mirrored_score)
+    # Notes of a chord are in order of their keys.
+    order = np.lexsort((-mirrored_score.key, mirrored_score.onset))
+    assert (fingering.hand >= 0).all()
+    np.testing.assert_array_equal(mirrored.hand[order], 1 - fingering.hand)
+    np.testing.assert_array_equal(mirrored.finger[order], fingering.finger)
+
+
+def test_real_music_mirrored_is_dropped_as_much() -> None:
+    score = Score.from_midi(find_song("bach-prelude-c")).clip(0.0, 10.0)
+    assert score.key.max() <= MIRROR
+    mirrored = Score(MIRROR - score.key, score.onset, score.offset, score.velocity)
+    dropped, mirror_dropped = (
+        int((find_fingering(music).hand < 0).sum()) for music in (score, mirrored)
+    )
+    assert abs(dropped - mirror_dropped) <= 0.05 * len(score)
+
+
+def test_octaves_are_alike() -> None:
+    """What is far from the other hand is fingered alike an octave higher.
+
+    Not the first notes: there, the hand still comes from where it rests.
+    """
+    keys = [63, 65, 67, 68, 70, 68, 67, 65] * 3
+    low, high = (find_fingering(melody([key + shift for key in keys])) for shift in (0, 12))
+    np.testing.assert_array_equal(low.hand[8:], high.hand[8:])
+    np.testing.assert_array_equal(low.finger[8:], high.finger[8:])
+
+
+def test_is_deterministic() -> None:
+    score = Score.from_midi(find_song("beethoven-fur-elise")).clip(0.0, 8.0)
+    one, other = find_fingering(score), find_fingering(score)
+    np.testing.assert_array_equal(one.hand, other.hand)
+    np.testing.assert_array_equal(one.finger, other.finger)
