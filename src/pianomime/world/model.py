@@ -34,6 +34,9 @@ _GEOM_TYPES = {
 # Keys and hands touch each other, but no hand touches a hand (as in the paper's world).
 _HAND_MASK = {"contype": 1, "conaffinity": 0}
 _KEY_MASK = {"contype": 0, "conaffinity": 1}
+_NO_CONTACT = {"contype": 0, "conaffinity": 0}
+# Hidden in their neighbours, or never over the keys: not worth looking for contacts.
+_OUT_OF_REACH = ("forearm", "wrist", "knuckle", "thbase", "thhub")
 _FOREARM_BASE = {"rh": (0.4, 0.15, 0.13), "lh": (0.4, -0.15, 0.13)}
 _FOREARM_QUAT = (-0.5, -0.5, 0.5, 0.5)
 
@@ -135,8 +138,9 @@ def add_hand(spec: mujoco.MjSpec, side: Side) -> None:
         bodies[name] = body
         for joint in figures["joints"]:
             _add_joint(body, joint, side, mirror)
+        reaches = not name.endswith(_OUT_OF_REACH)
         for geom in figures["geoms"]:
-            _add_geom(body, geom, side, mirror)
+            _add_geom(body, geom, side, mirror, reaches)
         if "fingertip" in figures:
             body.add_site(
                 name=f"{side}_{name.removesuffix('distal')}_tip",
@@ -198,9 +202,11 @@ def _add_joint(body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror
     )
 
 
-def _add_geom(body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float) -> None:
+def _add_geom(
+    body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float, reaches: bool
+) -> None:
     look = {"rgba": (0.25, 0.27, 0.32, 1.0), "group": 2}
-    contact = {**FIGURES["hand"]["contact"], **_HAND_MASK}
+    contact = {**FIGURES["hand"]["contact"], **(_HAND_MASK if reaches else _NO_CONTACT)}
     if figures["type"] == "hull":
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH,
