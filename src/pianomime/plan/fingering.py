@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,9 @@ class FingeringConfig:
     drop: float = 12.0
     """For a note that no finger plays, and"""
     drop_frame: float = 0.5
-    """for each frame that it would have sounded."""
+    """for each frame that it would have sounded, or that a held note is cut short by."""
+    cut: float = 15.0
+    """For a held note that is let go early, on top."""
     travel_speed: float = 0.5
     """[m/s] of a hand that costs 1 (it grows with the square)."""
     hop_speed: float = 0.25
@@ -47,10 +50,18 @@ class FingeringConfig:
 
 @dataclass(frozen=True, eq=False)
 class Fingering:
-    """Attributes: hand (N,) int8 0 left, 1 right, -1 not played; finger (N,) int8 0 thumb .. 4."""
+    """Who plays the N notes of a score, and until when.
+
+    Attributes:
+        hand: (N,) int8; 0 left, 1 right, -1 not played.
+        finger: (N,) int8; 0 thumb .. 4 little, -1 not played.
+        stop: (N,) first frame in which the finger has let go; before the note's end where the
+            finger or the hand is needed elsewhere.
+    """
 
     hand: NDArray[np.int8]
     finger: NDArray[np.int8]
+    stop: NDArray[np.int64]
 
 
 def find_fingering(score: Score, config: FingeringConfig | None = None) -> Fingering:
@@ -60,11 +71,10 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     more than leaving it out; of more than ten notes struck at once the inner ones go first.
     """
     config = config or FingeringConfig()
-    hand = np.full(len(score), -1, np.int8)
-    finger = np.full(len(score), -1, np.int8)
-    if not len(score):
-        return Fingering(hand, finger)
     frames = score.note_frames()
+    fingering = Fingering(
+        np.full(len(score), -1, np.int8), np.full(len(score), -1, np.int8), frames[:, 1].copy()
+    )
     beam = _Beam.start()
     history = []
     onsets, event = np.unique(frames[:, 0], return_inverse=True)
@@ -76,16 +86,34 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
         np.maximum.at(ends, voice, frames[group, 1])
         outer = np.ones(len(keys), bool)
         outer[_FINGERS : len(keys) - _FINGERS] = False
-        beam, parent, assignment = beam.extend(int(onset), keys[outer], ends[outer], config)
+        beam, choice = beam.extend(int(onset), keys[outer], ends[outer], config)
         place = np.where(outer, np.cumsum(outer) - 1, -1)[voice]
-        history.append((group, place, parent, assignment))
-    best = int(np.argmin(beam.cost))
-    for group, place, parent, assignment in reversed(history):
-        choice = np.where(place >= 0, assignment[best][place], -1)
-        played = group[choice >= 0]
-        hand[played], finger[played] = np.divmod(choice[choice >= 0], _FINGERS)
-        best = int(parent[best])
-    return Fingering(hand, finger)
+        history.append((onset, group, place, choice))
+    chain = []
+    row = int(np.argmin(beam.cost))
+    for onset, group, place, choice in reversed(history):
+        chain.append((onset, group, place, choice.assignment[row], choice.let_go[row]))
+        row = int(choice.parent[row])
+    sounding = np.full((2, _FINGERS), -1)
+    for onset, group, place, assignment, let_go in reversed(chain):
+        mine = np.where(place >= 0, assignment[place], -1)
+        played = group[mine >= 0]
+        hand, finger = np.divmod(mine[mine >= 0], _FINGERS)
+        fingering.hand[played], fingering.finger[played] = hand, finger
+        let_go = let_go[:, None] & np.ones(_FINGERS, bool)
+        let_go[hand, finger] = True
+        cut = sounding[let_go & (sounding >= 0)]
+        fingering.stop[cut] = np.minimum(fingering.stop[cut], onset)
+        sounding[hand, finger] = played
+    return fingering
+
+
+class _Choice(NamedTuple):
+    """How each of B rows of a beam came from the one before."""
+
+    parent: NDArray[np.int64]  # (B,) the row it came from
+    assignment: NDArray[np.int8]  # (B, M) 0..4 left thumb to little, 5..9 right, -1 not played
+    let_go: NDArray[np.bool_]  # (B, 2) hands that let go of everything they held
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,20 +140,18 @@ class _Beam:
         keys: NDArray[np.int64],
         ends: NDArray[np.int64],
         config: FingeringConfig,
-    ) -> tuple[_Beam, NDArray[np.int64], NDArray[np.int8]]:
-        """Every way to play the notes struck at `onset`; the best few are kept.
-
-        Returns the new beam, for each of its rows the row it came from, and the finger of each
-        note (B, M): 0..4 left thumb to little, 5..9 right, -1 not played.
-        """
+    ) -> tuple[_Beam, _Choice]:
+        """Every way to play the notes struck at `onset`; the best few are kept."""
         options, pairs = _options(len(keys))
-        sides = [self._hand_cost(side, onset, keys, options, config) for side in (LEFT, RIGHT)]
-        (left, left_centre), (right, right_centre) = sides
+        left, right = (
+            self._hand_cost(side, onset, keys, options, config) for side in (LEFT, RIGHT)
+        )
         played = (options[pairs[:, 0]] >= 0) | (options[pairs[:, 1]] >= 0)
         dropped = ~played @ (config.drop + config.drop_frame * (ends - onset))
-        total = self.cost[:, None] + left[:, pairs[:, 0]] + right[:, pairs[:, 1]] + dropped
-        near = right_centre[:, pairs[:, 1]] - left_centre[:, pairs[:, 0]] < config.apart
-        total += config.crossed * near
+        total = self.cost[:, None] + left.cost[:, pairs[:, 0]] + right.cost[:, pairs[:, 1]]
+        total += dropped
+        apart = right.centre[:, pairs[:, 1]] - left.centre[:, pairs[:, 0]]
+        total += config.crossed * (apart < config.apart)
         keep = min(config.beam, total.size)
         chosen = np.argpartition(total.ravel(), keep - 1)[:keep]
         parent, pair = np.unravel_index(chosen, total.shape)
@@ -135,15 +161,17 @@ class _Beam:
             options[left_option],
             np.where(options[right_option] >= 0, options[right_option] + _FINGERS, -1),
         ).astype(np.int8)
+        picks = ((left, left_option), (right, right_option))
+        let_go = np.stack([hand.let_go[parent, option] for hand, option in picks], axis=1)
+        centre = np.stack([hand.centre[parent, option] for hand, option in picks], axis=1)
         key, until = self.key[parent].copy(), self.until[parent].copy()
+        until = np.where(let_go[..., None], np.minimum(until, onset), until)
         row, note = np.nonzero(assignment >= 0)
         side, finger = np.divmod(assignment[row, note], _FINGERS)
         key[row, side, finger] = keys[note]
         until[row, side, finger] = ends[note]
-        centre = np.stack(
-            [left_centre[parent, left_option], right_centre[parent, right_option]], axis=1
-        )
-        return _Beam(total[parent, pair], key, until, centre), parent, assignment
+        beam = _Beam(total[parent, pair], key, until, centre)
+        return beam, _Choice(parent, assignment, let_go)
 
     def _hand_cost(
         self,
@@ -152,26 +180,46 @@ class _Beam:
         keys: NDArray[np.int64],
         options: NDArray[np.int64],
         config: FingeringConfig,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Cost (B, O) of each option for one hand, and where the hand then is (B, O) [m]."""
-        along = key_centres()[:, 1]
-        ease = _EASE if side == RIGHT else -_EASE
-        last, until = self.key[:, side], self.until[:, side]
+    ) -> _HandCost:
+        """What each option costs one hand, holding what it holds or letting go of it all."""
         # (O, 5): the key each finger is to strike, -1 none.
         strikes = np.full((len(options), _FINGERS), -1)
         option, note = np.nonzero(options >= 0)
         strikes[option, options[option, note]] = keys[note]
+        remaining = np.maximum(self.until[:, side] - onset, 0)
+        holding = self._pose_cost(side, onset, strikes, remaining > 0, config)
+        open_hand = self._pose_cost(side, onset, strikes, np.zeros_like(remaining, bool), config)
+        price = np.where(remaining > 0, config.cut + config.drop_frame * remaining, 0.0)
+        # A held finger that strikes another key lets go of its own in any case.
+        hold_cost = holding[0] + price @ (strikes >= 0).T
+        open_cost = open_hand[0] + price.sum(axis=1, keepdims=True)
+        let_go = open_cost < hold_cost
+        return _HandCost(
+            np.where(let_go, open_cost, hold_cost),
+            np.where(let_go, open_hand[1], holding[1]),
+            let_go,
+        )
+
+    def _pose_cost(
+        self,
+        side: int,
+        onset: int,
+        strikes: NDArray[np.int64],
+        held: NDArray[np.bool_],
+        config: FingeringConfig,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Cost (B, O) of striking keys (O, 5) while holding (B, 5), and the hand's place [m]."""
+        along = key_centres()[:, 1]
+        ease = _EASE if side == RIGHT else -_EASE
+        last, until = self.key[:, side], np.minimum(self.until[:, side], onset)
         struck = strikes >= 0
-        held = until > onset
         # (B, O, 5): what each finger is on once the notes are struck.
         busy = struck[None] | held[:, None]
-        clash = (struck[None] & held[:, None]).any(axis=2)
         at = along[np.where(struck[None], strikes[None], last[:, None])]
         count = busy.sum(axis=2)
         wish = np.where(busy, at - ease, 0.0).sum(axis=2) / np.maximum(count, 1)
-        centre = np.where(count > 0, wish, self.centre[:, None, side])
-        # A hand need not follow exactly: it moves as little as leaves every finger at ease.
         before = self.centre[:, None, side]
+        centre = np.where(count > 0, wish, before)
         stray = np.where(busy, at - ease - centre[..., None], 0.0)
         cost = ((stray / _SPREAD) ** 2).sum(axis=2)
         cost += np.where((np.abs(stray) > _REACH).any(axis=2), 50.0, 0.0)
@@ -179,12 +227,11 @@ class _Beam:
         free_since = np.where(held, 0, until).max(axis=1)
         seconds = (np.maximum(onset - free_since, 0) + 1) * CONTROL_DT
         travel = np.abs(centre - before)
-        strikes_any = struck.any(axis=1)
         cost += np.where(
-            strikes_any[None], (travel / seconds[:, None] / config.travel_speed) ** 2, 0.0
+            struck.any(axis=1), (travel / seconds[:, None] / config.travel_speed) ** 2, 0.0
         )
         # Hop: a finger that goes to another key, on top of what the hand carries it.
-        idle = (np.maximum(onset - until, 0) + 1) * CONTROL_DT
+        idle = (onset - until + 1) * CONTROL_DT
         moved = np.where(
             struck[None] & (last[:, None] >= 0) & (strikes[None] != last[:, None]),
             np.abs(along[strikes[None]] - along[last[:, None]] - (centre - before)[..., None])
@@ -192,11 +239,17 @@ class _Beam:
             0.0,
         )
         cost += ((moved / idle[:, None] / config.hop_speed) ** 2).sum(axis=2)
-        comfort = config.weak_finger * struck[:, 3:].sum(axis=1)
-        thumb_on_black = struck[:, 0] & BLACK[strikes[:, 0]]
-        comfort = comfort + config.thumb_on_black * thumb_on_black
-        cost += comfort
-        return np.where(clash, np.inf, cost), centre
+        cost += config.weak_finger * struck[:, 3:].sum(axis=1)
+        cost += config.thumb_on_black * (struck[:, 0] & np.take(BLACK, strikes[:, 0]))
+        return cost, centre
+
+
+class _HandCost(NamedTuple):
+    """For each of B rows and O options: cost, where the hand then is [m], whether it let go."""
+
+    cost: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    let_go: NDArray[np.bool_]
 
 
 @cache

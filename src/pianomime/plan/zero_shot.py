@@ -96,9 +96,11 @@ def finger_keys(score: Score, fingering: Fingering) -> NDArray[np.int8]:
     """(T, 2, 5) int8: the key each finger presses in each frame, as the score's roll has it."""
     roll = score.roll()
     keys = np.full((len(roll), 2, 5), NO_KEY, np.int8)
-    for note, (first, end) in enumerate(score.note_frames()):
+    for note, first in enumerate(score.note_frames()[:, 0]):
         if fingering.hand[note] >= 0:
-            keys[first:end, fingering.hand[note], fingering.finger[note]] = score.key[note]
+            keys[first : fingering.stop[note], fingering.hand[note], fingering.finger[note]] = (
+                score.key[note]
+            )
     return keys
 
 
