@@ -33,6 +33,7 @@ WHITE_REST, BLACK_REST = (
 """[m] Height of a fingertip's site when it rests on a white or a black key."""
 
 # Joints 2 and 1 of each finger hang on one tendon and turn together when nothing touches them.
+_HELD = 1e9
 _COUPLED = [(7, 8), (11, 12), (15, 16), (20, 21)]
 
 
@@ -44,7 +45,7 @@ class PathConfig:
     """[m/s^2] of the forearm."""
     joint_acceleration: float = 400.0
     """[rad/s^2] of wrist and fingers."""
-    posture: float = 0.8
+    posture: float = 3.0
     """[rad] away from the home pose."""
     slide_posture: float = 0.1
     """[m] of the forearm toward and away from the piano."""
@@ -52,9 +53,11 @@ class PathConfig:
     """[rad] between the two end joints of a finger."""
     floor: float = 0.002
     """[m] below the floor that keeps idle fingertips off the keys."""
-    limit: float = 0.02
-    """[rad, m] beyond a joint limit."""
-    iterations: int = 8
+    damping: float = 0.3
+    """[rad, m] of a joint in one step."""
+    step: float = 0.4
+    """[rad, m] that a joint moves at most in one step."""
+    iterations: int = 10
     """Gauss-Newton steps."""
 
 
@@ -87,8 +90,8 @@ def smooth_path(
     stiffness = _acceleration_weights(config)
     home = np.clip(HOME, hand.low, hand.high)
     path = np.tile(home, (frames, 1))
-    path[:, 0] = _slide_guess(hand, targets)
-    damping = 1e-3
+    path[:, 0] = _slide_guess(hand, targets, weights)
+    damping = config.damping**-2
     for _ in range(config.iterations):
         gradient = np.empty((frames, HAND_JOINTS))
         blocks = np.empty((frames, HAND_JOINTS, HAND_JOINTS))
@@ -103,13 +106,14 @@ def smooth_path(
             rows = rows.reshape(-1, HAND_JOINTS)
             blocks[frame] = rows.T @ rows
             gradient[frame] = rows.T @ error.ravel()
-        beyond = np.minimum(path - hand.low, 0.0) + np.maximum(path - hand.high, 0.0)
-        hit = (beyond != 0.0) / config.limit**2
-        gradient += posture * (path - home) + path @ coupling + hit * beyond
+        gradient += posture * (path - home) + path @ coupling
         blocks += np.diag(posture + damping) + coupling
-        blocks[:, np.arange(HAND_JOINTS), np.arange(HAND_JOINTS)] += hit
-        path += _step(blocks, gradient, stiffness, path, start)
-    return np.vstack([start, np.clip(path, hand.low, hand.high)])
+        # A joint at a limit that it is pushed against stays there for this step.
+        held = ((path <= hand.low) & (gradient > 0)) | ((path >= hand.high) & (gradient < 0))
+        blocks[:, np.arange(HAND_JOINTS), np.arange(HAND_JOINTS)] += held * _HELD
+        step = _step(blocks, gradient, stiffness, path, start)
+        path = np.clip(path + np.clip(step, -config.step, config.step), hand.low, hand.high)
+    return np.vstack([start, path])
 
 
 def resting_height(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -136,11 +140,20 @@ def _coupling_hessian(config: PathConfig) -> NDArray[np.float64]:
     return hessian
 
 
-def _slide_guess(hand: Hand, targets: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Forearms start over the middle of their fingers' targets."""
-    rest = hand.points(np.zeros(HAND_JOINTS))
-    along: NDArray[np.float64] = (targets[:, 1:, 1] - rest[1:, 1]).mean(axis=1)
-    return along
+def _slide_guess(
+    hand: Hand, targets: NDArray[np.float64], weights: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(T,) [m] forearms start over the middle of their fingers' targets, or on the way there."""
+    home = np.clip(HOME, hand.low, hand.high)
+    weight = weights[:, 1:, 1]
+    total = weight.sum(axis=1)
+    guided = np.flatnonzero(total > 0.0)
+    if not len(guided):
+        return np.zeros(len(targets))
+    offset = targets[:, 1:, 1] - hand.points(home)[1:, 1]
+    along = (weight * offset).sum(axis=1)[guided] / total[guided]
+    guess: NDArray[np.float64] = np.interp(np.arange(len(targets)), guided, along)
+    return guess
 
 
 def _acceleration_weights(config: PathConfig) -> NDArray[np.float64]:

@@ -27,7 +27,9 @@ class ZeroShotConfig:
 
     fingering: FingeringConfig = field(default_factory=FingeringConfig)
     path: PathConfig = field(
-        default_factory=lambda: PathConfig(joint_acceleration=150.0, slide_acceleration=20.0)
+        default_factory=lambda: PathConfig(
+            joint_acceleration=150.0, slide_acceleration=20.0, iterations=16
+        )
     )
     hover: float = 0.010
     """[m] that idle fingertips stay above the keys."""
