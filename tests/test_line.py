@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 
 from any_score import scores
 from pianomime.music import Score
@@ -17,7 +17,6 @@ from pianomime.play import PLAYERS, Player
 @given(score=scores())
 def test_any_score_is_played(player: str, score: Score) -> None:
     # One frame alone is beyond the planner for now.
-    assume(score.frames() > 1)
     performance = Player.from_name(player).play(score)
     frames = len(score.roll())
     assert performance.ctrl.shape == (frames, 46)

@@ -75,6 +75,8 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     fingering = Fingering(
         np.full(len(score), -1, np.int8), np.full(len(score), -1, np.int8), frames[:, 1].copy()
     )
+    if not len(score):
+        return fingering
     beam = _Beam.start()
     history = []
     onsets, event = np.unique(frames[:, 0], return_inverse=True)
