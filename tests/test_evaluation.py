@@ -36,7 +36,7 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    assert set(results) == {"player", "songs", "mean"}
+    assert set(results) == {"player", "songs", "mean", "causes"}
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())
     broken = rows.pop("broken|one")
@@ -47,8 +47,16 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     assert sorted(step[:2] for step in told) == [(n, 6) for n in range(1, 7)]
     assert told[-1][2] == pytest.approx(mean)
 
-    table = (out / "results.md").read_text(encoding="utf-8").splitlines()
+    for kind in ("missed", "wrong"):
+        lost = sum(sum(row["causes"][kind].values()) for row in rows.values())
+        wanted = sum(row["causes"]["wanted"] for row in rows.values())
+        assert sum(results["causes"][kind].values()) == pytest.approx(lost / wanted, abs=1e-4)
+    assert "causes" not in results["mean"]
+
+    tables = (out / "results.md").read_text(encoding="utf-8").split("\n\n")
+    table, causes = (text.splitlines() for text in tables)
     assert len(table) == 2 + 6 + 1
+    assert len(causes) == 2 + sum(len(shares) for shares in results["causes"].values())
     # Every line has as many cells as the first, the bar in the broken one's name escaped.
     assert len({line.replace("\\|", "").count("|") for line in table}) == 1
 
@@ -110,6 +118,7 @@ def test_when_all_fail_there_is_no_mean(tmp_path: Path) -> None:
     (tmp_path / "broken.mid").write_text("this is no music")
     results = evaluate(tmp_path, jobs=1)
     assert results["mean"] == {}
+    assert results["causes"] == {"missed": {}, "wrong": {}}
     assert "failed" in markdown(results)
     assert list(tmp_path.iterdir()) == [tmp_path / "broken.mid"]
 

@@ -40,6 +40,7 @@ class Command(NamedTuple):
 COMMANDS = {
     "play": Command("pianomime.commands.play", "Play", "play a song and report on it"),
     "evaluate": Command("pianomime.commands.evaluate", "Evaluate", "play and score many songs"),
+    "explain": Command("pianomime.commands.explain", "Explain", "say why notes went wrong"),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }
 
@@ -54,6 +55,7 @@ def _help() -> str:
         "  pianomime play ode-to-joy\n"
         "  pianomime play SONG.mid -o out/song --seconds 60\n"
         "  pianomime evaluate FOLDER -o out/all --jobs 2\n"
+        "  pianomime explain out/song/performance.npz\n"
     )
 
 

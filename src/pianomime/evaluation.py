@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import queue
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
@@ -18,7 +19,8 @@ from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
 
 Row = dict[str, Any]
-"""The numbers of one song (see `pianomime.report.numbers`), or `song` and `error`."""
+"""The numbers of one song (see `pianomime.report.numbers`) and its `causes` (see
+`pianomime.explain.frames_by_cause`, if the player plans), or `song` and `error`."""
 
 Progress = Callable[[int, int, float], None]
 """Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
@@ -47,8 +49,10 @@ def evaluate(
         progress: told how far it is.
 
     Returns:
-        What `results.json` holds: `player`, `songs` (a row each, in the order of `paths`) and
-        `mean` (of every number, over the songs that did not fail; empty if all did).
+        What `results.json` holds: `player`, `songs` (a row each, in the order of `paths`),
+        `mean` (of every number, over the songs that did not fail; empty if all did) and `causes`
+        (`missed` and `wrong`: the share of the key-frames wanted in all songs that each cause
+        cost, the costliest first).
 
     Raises:
         InputError: a path stands for no song, or there is no such player.
@@ -86,6 +90,7 @@ def evaluate(
         "player": player,
         "songs": [rows[song] for song in songs],
         "mean": _mean(list(rows.values())),
+        "causes": _causes(list(rows.values())),
     }
     if store is not None:
         store.close(results)
@@ -93,7 +98,7 @@ def evaluate(
 
 
 def markdown(results: dict[str, Any]) -> str:
-    """The results as a Markdown table, a line a song and one of the means.
+    """The results as Markdown: a table of songs and their means, and one of causes.
 
     Args:
         results: what `evaluate` returns.
@@ -120,6 +125,16 @@ def markdown(results: dict[str, Any]) -> str:
     if mean:
         whole = f"{mean['dropped_notes']:.1f}/{mean['notes']:.1f} | {mean['blow_ups']:.1f}"
         lines.append(f"| **mean** | {' | '.join(cells(mean))} | {whole} |")
+    causes = [
+        (share, kind, cause)
+        for kind, shares in results["causes"].items()
+        for cause, share in shares.items()
+    ]
+    if causes:
+        lines += ["", "| cause | | of the key-frames wanted |", "| --- | --- | ---: |"]
+        lines += [
+            f"| {cause} | {kind} | {share:.2%} |" for share, kind, cause in sorted(causes)[::-1]
+        ]
     return "\n".join(lines) + "\n"
 
 
@@ -128,8 +143,21 @@ def _mean(rows: list[Row]) -> dict[str, float]:
     good = [row for row in rows if "error" not in row]
     if not good:
         return {}
-    names = [name for name, value in good[0].items() if not isinstance(value, str)]
+    names = [name for name, value in good[0].items() if isinstance(value, int | float)]
     return {name: round(sum(row[name] for row in good) / len(good), 6) for name in names}
+
+
+def _causes(rows: list[Row]) -> dict[str, dict[str, float]]:
+    """Share of the key-frames wanted that each cause cost, over all songs together."""
+    known = [row["causes"] for row in rows if "causes" in row]
+    wanted = max(sum(causes["wanted"] for causes in known), 1)
+    shares = {}
+    for kind in ("missed", "wrong"):
+        frames: Counter[str] = Counter()
+        for causes in known:
+            frames.update(causes[kind])
+        shares[kind] = {cause: round(count / wanted, 6) for cause, count in frames.most_common()}
+    return shares
 
 
 class _Store:

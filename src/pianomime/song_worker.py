@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any
 
 from pianomime.errors import InputError
+from pianomime.explain import explain, frames_by_cause
 from pianomime.music import Score
 from pianomime.play import Player, excerpt
 from pianomime.report.numbers import numbers
@@ -89,8 +90,12 @@ class SongWorker:
 def _row(song: Path, player: Player, seconds: float) -> dict[str, Any]:
     try:
         score = excerpt(Score.from_midi(song), seconds=seconds)
+        performance = player.play(score)
         # Two files can bear one title, but not one name in a folder.
-        return {**numbers(player.play(score)), "song": song.stem}
+        row: dict[str, Any] = {**numbers(performance), "song": song.stem}
+        if performance.plan is not None:
+            row["causes"] = frames_by_cause(explain(performance))
+        return row
     except (InputError, OSError) as error:
         return {"song": song.stem, "error": str(error)}
     except Exception as error:  # A bug of ours must not cost the other songs either.

@@ -14,7 +14,8 @@ from pianomime.performance import Performance
 from pianomime.report.mp3 import mp3
 from pianomime.report.numbers import Row, numbers
 from pianomime.report.page import page
-from pianomime.report.picture import DARK, LIGHT, draw
+from pianomime.report.picture import draw
+from pianomime.report.roll import DARK, LIGHT
 
 FILES = (
     "report.html",
