@@ -36,7 +36,7 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    assert set(results) == {"player", "songs", "mean", "causes"}
+    assert set(results) == {"player", "effort", "songs", "mean", "causes"}
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())
     broken = rows.pop("broken|one")
@@ -106,7 +106,7 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
 
 def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
-    with SongWorker("zero-shot", 1.0) as worker:
+    with SongWorker("zero-shot", 0, 1.0) as worker:
         assert "f1" in worker.play(song)
         os.kill(worker.pid, signal.SIGKILL)
         crashed = worker.play(song)

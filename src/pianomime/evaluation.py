@@ -14,7 +14,7 @@ from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.files import atomic
-from pianomime.play import SECONDS, Player
+from pianomime.play import EFFORT, SECONDS, Player
 from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
 
@@ -33,6 +33,7 @@ def evaluate(
     jobs: int | None = None,
     out: str | Path | None = None,
     progress: Progress | None = None,
+    effort: int = EFFORT,
 ) -> dict[str, Any]:
     """Play and score songs, several at a time, each in a process of its own.
 
@@ -47,24 +48,25 @@ def evaluate(
         jobs: processes; one a core if None.
         out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
         progress: told how far it is.
+        effort: how hard the player tries, 0 to 3.
 
     Returns:
-        What `results.json` holds: `player`, `songs` (a row each, in the order of `paths`),
-        `mean` (of every number, over the songs that did not fail; empty if all did) and `causes`
-        (`missed` and `wrong`: the share of the key-frames wanted in all songs that each cause
-        cost, the costliest first).
+        What `results.json` holds: `player`, `effort`, `songs` (a row each, in the order of
+        `paths`), `mean` (of every number, over the songs that did not fail; empty if all did)
+        and `causes` (`missed` and `wrong`: the share of the key-frames wanted in all songs that
+        each cause cost, the costliest first).
 
     Raises:
         InputError: a path stands for no song, or there is no such player.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
-    Player.from_name(player)
+    Player.from_name(player, effort)
     if not seconds > 0:
         raise InputError(f"seconds must be more than 0, not {seconds:g}")
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
-    store = None if out is None else _Store(Path(out), f"{player} {seconds:g}")
+    store = None if out is None else _Store(Path(out), f"{player} {effort} {seconds:g}")
 
     rows: dict[Path, Row] = {}
 
@@ -81,13 +83,14 @@ def evaluate(
             waiting.append(song)
         else:
             finish(song, known)
-    for song, row in _play_all(waiting, player, seconds, jobs or os.cpu_count() or 1):
+    for song, row in _play_all(waiting, player, effort, seconds, jobs or os.cpu_count() or 1):
         if store is not None and "error" not in row:
             store.put(song, row)
         finish(song, row)
 
     results = {
         "player": player,
+        "effort": effort,
         "songs": [rows[song] for song in songs],
         "mean": _mean(list(rows.values())),
         "causes": _causes(list(rows.values())),
@@ -210,13 +213,13 @@ def _program_hash() -> str:
 
 
 def _play_all(
-    songs: list[Path], player: str, seconds: float, jobs: int
+    songs: list[Path], player: str, effort: int, seconds: float, jobs: int
 ) -> Iterator[tuple[Path, Row]]:
     """Songs with their rows, in the order in which they finish."""
     if not songs:
         return
     idle: queue.SimpleQueue[SongWorker] = queue.SimpleQueue()
-    workers = [SongWorker(player, seconds) for _ in range(min(jobs, len(songs)))]
+    workers = [SongWorker(player, effort, seconds) for _ in range(min(jobs, len(songs)))]
     for worker in workers:
         idle.put(worker)
 

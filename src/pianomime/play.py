@@ -19,6 +19,9 @@ from pianomime.world import World
 Progress = Callable[[str, int, int], None]
 """Called with a stage ("planning", "playing"), the steps done and the steps in all (0: unknown)."""
 
+EFFORT = 1
+"""How hard players try unless told otherwise, 0 to 3."""
+
 SECONDS = 30.0
 """Length of an excerpt unless told otherwise: the longest clip of the paper's protocol."""
 
@@ -63,18 +66,23 @@ class Player:
     tracker: Tracker
 
     @classmethod
-    def from_name(cls, name: str) -> Player:
+    def from_name(cls, name: str, effort: int = EFFORT) -> Player:
         """A player that the house knows.
 
         Args:
             name: one of `PLAYERS`.
+            effort: 0 plays straight away; 1 to 3 try variations of what goes wrong before it
+                is played, ever more of them. Players that do not search are always the same.
 
         Raises:
-            InputError: there is no such player; the message lists those there are.
+            InputError: there is no such player, or no such effort; the message lists those
+                there are.
         """
+        if effort not in range(4):
+            raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
         if name not in PLAYERS:
             raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
-        return PLAYERS[name]()
+        return PLAYERS[name](effort)
 
     def play(self, score: Score, progress: Progress | None = None) -> Performance:
         """Perform a score from the rest pose; the same score gives the same performance.
@@ -122,22 +130,28 @@ class Player:
         )
 
 
-def _zero_shot() -> Player:
+def _zero_shot(effort: int) -> Player:
     from pianomime.plan import ZeroShotPlanner
-    from pianomime.track import DynamicTracker
+    from pianomime.track import DynamicTracker, RolloutConfig, RolloutTracker
 
-    return Player("zero-shot", ZeroShotPlanner(), DynamicTracker())
+    tracker: Tracker = DynamicTracker()
+    if effort:
+        tracker = RolloutTracker(tracker, RolloutConfig.of_effort(effort))
+    return Player("zero-shot", ZeroShotPlanner(), tracker)
 
 
-def _zero_shot_ik() -> Player:
+def _zero_shot_ik(effort: int) -> Player:
     from pianomime.plan import ZeroShotPlanner
     from pianomime.track import IkTracker
 
     return Player("zero-shot-ik", ZeroShotPlanner(), IkTracker())
 
 
-PLAYERS: dict[str, Callable[[], Player]] = {
+PLAYERS: dict[str, Callable[[int], Player]] = {
     "zero-shot": _zero_shot,
     "zero-shot-ik": _zero_shot_ik,
 }
-"""Every player by name. A new one is one more line, with the import inside its function."""
+"""Every player by name, given the effort.
+
+A new one is one more line, with the import inside its function.
+"""

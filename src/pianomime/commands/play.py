@@ -24,6 +24,7 @@ class Play:
     Examples:
       pianomime play ode-to-joy
       pianomime play SONG.mid -o out/song --no-video
+      pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
     """
 
@@ -33,6 +34,8 @@ class Play:
     """Folder for the report; out/NAME if not given."""
     player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
     """Name of the player."""
+    effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
+    """How hard to try: 0 plays straight away, 1 to 3 try out variations of what goes wrong."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much to play at most, from the first note at or after START [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
@@ -55,7 +58,7 @@ class Play:
         from pianomime.report import FILES, staged, write_report
         from pianomime.song_files import find_song
 
-        player = Player.from_name(self.player)
+        player = Player.from_name(self.player, self.effort)
         midi = find_song(self.song)
         score = excerpt(Score.from_midi(midi), self.start, self.seconds)
         out = self.out or Path("out", midi.stem)

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from pianomime.plan import FingertipPlan
 from pianomime.track.tracker import Tracker
 from pianomime.world import World, WorldBatch
+from pianomime.world.figures import key_centres
 from pianomime.world.hand import SIDES, Hand
+
+# Actuators of a hand: wrist and forearm, and each finger's, thumb first.
+_ARM = [0, 1, 20, 21, 22]
+_FINGERS = [slice(2, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 20)]
 
 
 @dataclass(frozen=True)
@@ -32,12 +37,23 @@ class RolloutConfig:
     """Frames that are looked ahead."""
     knots: int = 4
     """Frames between the points that a variation is drawn at."""
-    joint: float = 0.12
+    joint: float = 0.2
     """[rad] Standard deviation of a variation, of finger joints;"""
-    wrist: float = 0.04
+    wrist: float = 0.06
     """[rad] of the wrist;"""
-    slide: float = 0.004
+    slide: float = 0.006
     """[m] of the forearm."""
+    blamed: float = 0.7
+    """Chance that an actuator of a finger that goes wrong is varied;"""
+    arm: float = 0.3
+    """of its wrist and forearm;"""
+    others: float = 0.1
+    """of the hand's other fingers."""
+
+    @classmethod
+    def of_effort(cls, effort: int) -> RolloutConfig:
+        """From 1, faster than the music on two cores, to 3, as good as it gets."""
+        return {1: cls(), 2: cls(rounds=3), 3: cls(variations=64, rounds=6)}[effort]
 
 
 class RolloutTracker:
@@ -54,6 +70,8 @@ class RolloutTracker:
         """Prepare the tracker; draw the same variations for the same plan."""
         self._tracker.begin(plan)
         self._goal = plan.keys()
+        self._finger_key = plan.finger_key
+        self._along = plan.fingertips[:, :, 1:, 1]
         self._rng = np.random.default_rng(0)
         self._ctrl: list[NDArray[np.float64]] = []
 
@@ -77,8 +95,9 @@ class RolloutTracker:
         if not wrong[: self.config.commit + 2].any():
             return ctrl
         moment = world.state()
+        chance = self._chances(frame, wrong)
         for _ in range(self.config.rounds):
-            tries = ctrl + self._variations(len(goal))
+            tries = ctrl + self._variations(len(goal), chance)
             tries[0] = ctrl
             cost = self._cost(moment, tries, goal)
             ctrl = tries[int(np.argmin(cost))]
@@ -101,12 +120,29 @@ class RolloutTracker:
             cost += wrong.sum(axis=1) + 0.1 * short.sum(axis=1)
         return cost + 100.0 * self._batch.blow_ups
 
-    def _variations(self, frames: int) -> NDArray[np.float64]:
+    def _chances(self, frame: int, wrong: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(46,) how likely each actuator is varied, given the keys (H, 88) that go wrong.
+
+        Mostly those of the fingers that miss a key or are nearest to one that is hit.
+        """
+        chance = np.zeros(46)
+        for step, key in np.argwhere(wrong):
+            players = np.argwhere(self._finger_key[frame + step] == key)
+            if not len(players):
+                away = np.abs(self._along[frame + step] - key_centres()[key, 1])
+                players = np.argwhere(away == away.min())
+            for index, finger in players:
+                mine = chance[self._hands[index].actuators]
+                np.maximum(mine, self.config.others, out=mine)
+                mine[_ARM] = np.maximum(mine[_ARM], self.config.arm)
+                mine[_FINGERS[finger]] = self.config.blamed
+        return chance
+
+    def _variations(self, frames: int, chance: NDArray[np.float64]) -> NDArray[np.float64]:
         """(B, frames, 46) smooth random additions to the controls."""
         points = np.arange(0, frames + self.config.knots, self.config.knots)
         drawn = self._rng.standard_normal((self.config.variations, len(points), 46)) * self._spread
-        # Few joints at once: a variation of everything helps nothing.
-        drawn *= self._rng.random((self.config.variations, 1, 46)) < 0.3
+        drawn *= self._rng.random((self.config.variations, 1, 46)) < chance
         at = np.arange(frames)
         low = at // self.config.knots
         share = ((at % self.config.knots) / self.config.knots)[:, None]
