@@ -87,6 +87,7 @@ class WorldBatch(Moment):
         before = self.qpos
         self._batch.bind("ctrl")[:] = wanted
         self.pedal[:] = pedal
+        self._stir_keys()
         self._batch.step(nstep=SUBSTEPS)
         broken = self._broken()
         if len(broken):

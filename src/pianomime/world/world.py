@@ -73,6 +73,7 @@ class World(Moment):
         before = self.data.qpos.copy()
         self.data.ctrl[:] = wanted
         self.pedal = bool(pedal)
+        self._stir_keys()
         mujoco.mj_step(self.model, self.data, nstep=SUBSTEPS)
         if self._broken():
             self.blow_ups += 1
