@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -112,6 +113,31 @@ def test_a_crash_costs_one_song(folder: Path) -> None:
         crashed = worker.play(song)
         assert crashed == {"song": song.stem, "error": "its process died (exit code -9)"}
         assert "f1" in worker.play(song)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
+def test_no_process_outlives_a_run_that_stops(
+    error: type[BaseException], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[subprocess.Popen[str]] = []
+    start = SongWorker._start
+
+    def note(worker: SongWorker) -> subprocess.Popen[str]:
+        started.append(start(worker))
+        return started[-1]
+
+    def stop(done: int, total: int, f1: float) -> None:
+        if done:
+            raise error
+
+    monkeypatch.setattr(SongWorker, "_start", note)
+    before = set(threading.enumerate())
+    with pytest.raises(error):
+        evaluate(folder, seconds=1.0, jobs=2, effort=0, progress=stop)
+    for thread in set(threading.enumerate()) - before:
+        thread.join(timeout=10)
+    assert len(started) == 2
+    assert all(process.poll() is not None for process in started)
 
 
 def test_when_all_fail_there_is_no_mean(tmp_path: Path) -> None:

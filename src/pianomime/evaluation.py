@@ -7,8 +7,10 @@ import json
 import os
 import queue
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,9 @@ from pianomime.song_worker import SongWorker
 Row = dict[str, Any]
 """The numbers of one song (see `pianomime.report.numbers`) and its `causes` (see
 `pianomime.explain.frames_by_cause`, if the player plans), or `song` and `error`."""
+
+# Those that decide how a song is played.
+_LIBRARIES = ("daqp", "mujoco", "numpy", "scipy", "symusic")
 
 Progress = Callable[[int, int, float], None]
 """Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
@@ -83,10 +88,11 @@ def evaluate(
             waiting.append(song)
         else:
             finish(song, known)
-    for song, row in _play_all(waiting, player, effort, seconds, jobs or os.cpu_count() or 1):
-        if store is not None and "error" not in row:
-            store.put(song, row)
-        finish(song, row)
+    with closing(_play_all(waiting, player, effort, seconds, jobs or _cores())) as played:
+        for song, row in played:
+            if store is not None and "error" not in row:
+                store.put(song, row)
+            finish(song, row)
 
     results = {
         "player": player,
@@ -204,17 +210,26 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _program_hash() -> str:
-    """Changes with our code and figures, so that results of another program are not reused."""
+    """Changes with our code, its figures and its libraries, so that no older result is reused."""
     digest = hashlib.sha256()
+    for library in _LIBRARIES:
+        digest.update(f"{library} {version(library)} ".encode())
     for file in sorted(Path(__file__).parent.rglob("*")):
         if file.suffix in (".py", ".json"):
             digest.update(file.read_bytes())
     return digest.hexdigest()
 
 
+def _cores() -> int:
+    """The cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):  # Linux; a container often allows fewer than there are.
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def _play_all(
     songs: list[Path], player: str, effort: int, seconds: float, jobs: int
-) -> Iterator[tuple[Path, Row]]:
+) -> Generator[tuple[Path, Row], None, None]:
     """Songs with their rows, in the order in which they finish."""
     if not songs:
         return

@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import traceback
 import warnings
 from pathlib import Path
@@ -35,6 +36,9 @@ class SongWorker:
 
     def __init__(self, player: str, effort: int, seconds: float) -> None:
         self._arguments = [player, str(effort), str(seconds)]
+        # One thread may wait for a song in `play` while another calls `close`.
+        self._lock = threading.Lock()
+        self._closed = False
         self._process = self._start()
 
     @property
@@ -51,16 +55,19 @@ class SongWorker:
             line = self._process.stdout.readline()
         except BrokenPipeError:
             line = ""
-        if line:
+        if line.endswith("\n"):
             row: dict[str, Any] = json.loads(line)
             return row
         code = self._process.wait()
-        self.close()
-        self._process = self._start()
+        with self._lock:
+            if not self._closed:
+                self._process = self._start()
         return {"song": song.stem, "error": f"its process died (exit code {code})"}
 
     def close(self) -> None:
-        """End the process, also in the middle of a song."""
+        """End the process, also in the middle of a song, for good."""
+        with self._lock:
+            self._closed = True
         self._process.kill()
         self._process.wait()
 
