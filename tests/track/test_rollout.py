@@ -1,3 +1,5 @@
+import warnings
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -80,3 +82,14 @@ def test_more_effort_tries_more() -> None:
 def test_no_such_effort(effort: int) -> None:
     with pytest.raises(InputError, match="effort must be"):
         Player.from_name("zero-shot", effort)
+
+
+def test_an_imagined_disaster_is_no_warning(plan: FingertipPlan) -> None:
+    wild = RolloutConfig(variations=8, joint=50.0, wrist=50.0, slide=5.0)
+    tracker, world = RolloutTracker(DynamicTracker(), wild), World()
+    tracker.begin(plan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for frame in range(12):
+            world.step(tracker.control(frame, world))
+    assert world.blow_ups == 0

@@ -30,7 +30,7 @@ class RolloutConfig:
     variations: int = 32
     """Variations that are rolled out side by side."""
     rounds: int = 1
-    """Times that the best variation is varied again."""
+    """Times that variations of the best so far are drawn."""
     commit: int = 4
     """Frames that are played before looking ahead again."""
     ahead: int = 10
@@ -52,23 +52,27 @@ class RolloutConfig:
 
     @classmethod
     def of_effort(cls, effort: int) -> RolloutConfig:
-        """From 1, faster than the music on two cores, to 3, as good as it gets."""
+        """The settings of efforts 1 to 3: each tries several times as much as the one before."""
         return {1: cls(), 2: cls(rounds=3), 3: cls(variations=64, rounds=6)}[effort]
 
 
 class RolloutTracker:
-    """Plays what another tracker would, but for the variations that hit more keys."""
+    """Plays what another tracker would, but for the variations that hit more keys.
+
+    The other tracker is asked for frames ahead of time, more than once, on copies of the world:
+    its controls must depend on plan, frame and world alone.
+    """
 
     def __init__(self, tracker: Tracker, config: RolloutConfig | None = None) -> None:
         self.config = config or RolloutConfig()
         self._tracker = tracker
         self._hands = [Hand(side) for side in SIDES]
         self._spread = self._spreads()
-        self._batch = WorldBatch(self.config.variations)
 
     def begin(self, plan: FingertipPlan) -> None:
         """Prepare the tracker; draw the same variations for the same plan."""
         self._tracker.begin(plan)
+        self._batch = WorldBatch(self.config.variations, quiet=True)
         self._goal = plan.keys()
         self._finger_key = plan.finger_key
         self._along = plan.fingertips[:, :, 1:, 1]
@@ -84,7 +88,7 @@ class RolloutTracker:
     def _search(self, frame: int, world: World) -> NDArray[np.float64]:
         """Controls (H, 46) of the next frames."""
         goal = self._goal[frame : frame + self.config.ahead]
-        ahead = world.copy()
+        ahead = world.copy(quiet=True)
         ctrl = np.empty((len(goal), world.model.nu))
         pressed = np.empty_like(goal)
         for step in range(len(goal)):

@@ -56,6 +56,7 @@ def world_model() -> mujoco.MjModel:
     # World tells of broken physics itself; nobody wants MUJOCO_LOG.TXT beside their songs.
     log = mujoco.MjLogConfig.get()
     log.logto_file = False
+    log.logto_console = False
     log.set()
     return build_spec().compile()
 
