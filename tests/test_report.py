@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -131,6 +132,43 @@ def test_staging_replaces_what_is_ours_and_nothing_else(tmp_path: Path) -> None:
         "a": "new",
         "theirs": "old",
     }
+
+
+def test_a_new_folder_has_the_permissions_of_any_other(tmp_path: Path) -> None:
+    with staged(tmp_path / "out", []):
+        pass
+    (tmp_path / "other").mkdir()
+    assert (tmp_path / "out").stat().st_mode == (tmp_path / "other").stat().st_mode
+
+
+def test_the_folder_of_another_run_is_left_alone(tmp_path: Path) -> None:
+    other = tmp_path / f".pianomime-{os.getpid()}"
+    other.mkdir()
+    (other / "a").write_text("theirs")
+    with staged(tmp_path / "out", ["a"]) as folder:
+        (folder / "a").write_text("ours")
+    assert (other / "a").read_text() == "theirs"
+    assert (tmp_path / "out" / "a").read_text() == "ours"
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(tmp_path / "temporary"))
+
+    for module, function in (("tempfile", "mkdtemp"), ("os", "replace")):
+        out.mkdir(exist_ok=True)
+        with monkeypatch.context() as patch:
+            patch.setattr(f"{module}.{function}", refuse)
+            with (
+                pytest.raises(InputError, match=rf"^{out}: cannot be written: Permission denied$"),
+                staged(out, []) as folder,
+            ):
+                (folder / "a").write_text("new")
+        assert list(out.iterdir()) == []
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
