@@ -140,6 +140,17 @@ def test_no_process_outlives_a_run_that_stops(
     assert all(process.poll() is not None for process in started)
 
 
+def test_a_worker_does_not_wait_for_what_only_reports_need() -> None:
+    script = (
+        "import sys, pianomime.song_worker\n"
+        "print([name for name in ('matplotlib', 'av', 'rich') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[]\n"
+
+
 def test_when_all_fail_there_is_no_mean(tmp_path: Path) -> None:
     (tmp_path / "broken.mid").write_text("this is no music")
     results = evaluate(tmp_path, jobs=1)

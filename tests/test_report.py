@@ -16,8 +16,10 @@ import made_up
 from pianomime import Performance
 from pianomime.errors import InputError
 from pianomime.music import Score
-from pianomime.report import DARK, FILES, draw, numbers, staged, write_report
+from pianomime.numbers import numbers
+from pianomime.report import DARK, FILES, draw, staged, write_report
 from pianomime.report.mp3 import mp3
+from pianomime.world.render import RenderUnavailable
 
 PROTOCOL = (
     "song", "player", "song_seconds", "frames", "precision", "recall", "f1", "onset_f1",
@@ -76,12 +78,10 @@ def test_silence_can_be_reported(tmp_path: Path) -> None:
 def test_without_opengl_one_line_says_so_and_the_rest_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pianomime.world import render
-
     def nothing(*_: object, **__: object) -> None:
-        raise render.RenderUnavailable("no film: install OpenGL")
+        raise RenderUnavailable("no film: install OpenGL")
 
-    monkeypatch.setattr(render, "write_video", nothing)
+    monkeypatch.setattr("pianomime.report.write.write_video", nothing)
     notes: list[str] = []
     write_report(
         made_up.performance(made_up.score(notes=3)), tmp_path, True, lambda *_: None, notes.append

@@ -21,7 +21,7 @@ from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
 
 Row = dict[str, Any]
-"""The numbers of one song (see `pianomime.report.numbers`) and its `causes` (see
+"""The numbers of one song (see `pianomime.numbers`) and its `causes` (see
 `pianomime.explain.frames_by_cause`, if the player plans), or `song` and `error`."""
 
 # Those that decide how a song is played.

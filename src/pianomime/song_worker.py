@@ -21,8 +21,8 @@ from typing import Any
 from pianomime.errors import InputError
 from pianomime.explain import explain, frames_by_cause
 from pianomime.music import Score
+from pianomime.numbers import numbers
 from pianomime.play import Player, excerpt
-from pianomime.report.numbers import numbers
 
 
 class SongWorker:

@@ -11,7 +11,7 @@ import tyro
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from pianomime.report import Row
+    from pianomime.numbers import Row
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
-"""What a person looks at: the numbers, the pictures, the page."""
+"""What a person looks at: the pictures, the page."""
 
 from pianomime.report.explanation import EXPLANATION_FILES, write_explanation
-from pianomime.report.numbers import Row, numbers
 from pianomime.report.picture import draw
 from pianomime.report.roll import DARK, LIGHT, Theme, key_name
 from pianomime.report.staging import staged
@@ -12,11 +11,9 @@ __all__ = [
     "EXPLANATION_FILES",
     "FILES",
     "LIGHT",
-    "Row",
     "Theme",
     "draw",
     "key_name",
-    "numbers",
     "staged",
     "write_explanation",
     "write_report",

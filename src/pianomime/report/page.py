@@ -6,7 +6,7 @@ import base64
 from html import escape
 from string import Template
 
-from pianomime.report.numbers import Row
+from pianomime.numbers import Row
 
 _PAGE = Template("""\
 <!doctype html>
@@ -128,7 +128,7 @@ def page(
     """The report as one self-contained HTML page.
 
     Args:
-        numbers: what `pianomime.report.numbers` gives.
+        numbers: what `pianomime.numbers` gives.
         version: of PianoMime.
         played: MP3 of the performance.
         wanted: MP3 of the score.
