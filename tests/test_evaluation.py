@@ -37,7 +37,8 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    assert set(results) == {"player", "effort", "songs", "mean", "causes"}
+    assert set(results) == {"player", "effort", "seconds", "songs", "mean", "causes"}
+    assert results["seconds"] == 1.0
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())
     broken = rows.pop("broken|one")
@@ -45,7 +46,9 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     assert len(rows) == 5
     mean = sum(row["f1"] for row in rows.values()) / 5
     assert results["mean"]["f1"] == pytest.approx(mean, abs=1e-6)
-    assert sorted(step[:2] for step in told) == [(n, 6) for n in range(1, 7)]
+    assert {row["effort"] for row in rows.values()} == {results["effort"]}
+    assert "effort" not in results["mean"]
+    assert [step[:2] for step in told] == [(n, 6) for n in range(7)]
     assert told[-1][2] == pytest.approx(mean)
 
     for kind in ("missed", "wrong"):
@@ -170,9 +173,22 @@ def test_folders_are_searched_and_nothing_is_found_twice(folder: Path) -> None:
     assert deep / "UPPER.MIDI" in found
 
 
-def test_progress_has_no_mean_before_the_first_song(tmp_path: Path) -> None:
-    (tmp_path / "broken.mid").write_text("this is no music")
-    told: list[float] = []
-    evaluate(tmp_path, jobs=1, progress=lambda done, total, f1: told.append(f1))
-    assert len(told) == 1
-    assert math.isnan(told[0])
+def test_progress_is_told_before_any_process_works_and_has_no_mean_before_the_first_song(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "1.mid").write_text("this is no music")
+    (tmp_path / "2.mid").write_bytes(songs.path(songs.names()[0]).read_bytes())
+    told: list[tuple[int, int, float]] = []
+    start = SongWorker._start
+
+    def note(worker: SongWorker) -> subprocess.Popen[str]:
+        assert told == [(0, 2, pytest.approx(math.nan, nan_ok=True))]
+        return start(worker)
+
+    monkeypatch.setattr(SongWorker, "_start", note)
+    results = evaluate(
+        tmp_path, seconds=1.0, jobs=1, effort=0, progress=lambda *step: told.append(step)
+    )
+    assert [step[:2] for step in told] == [(0, 2), (1, 2), (2, 2)]
+    assert math.isnan(told[1][2])
+    assert told[2][2] == pytest.approx(results["mean"]["f1"], abs=1e-6)

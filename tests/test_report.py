@@ -22,7 +22,7 @@ from pianomime.report.mp3 import mp3
 from pianomime.world.render import RenderUnavailable
 
 PROTOCOL = (
-    "song", "player", "song_seconds", "frames", "precision", "recall", "f1", "onset_f1",
+    "song", "player", "effort", "song_seconds", "frames", "precision", "recall", "f1", "onset_f1",
     "pedal_f1", "plan_seconds", "simulate_seconds", "realtime_factor",
 )  # fmt: skip
 
@@ -34,6 +34,7 @@ def test_numbers_hold_what_was_agreed() -> None:
     assert row["frames"] == len(score.roll())
     assert row["dropped_notes"] == 1
     assert row["blow_ups"] == 1
+    assert row["effort"] == 2
     assert row["realtime_factor"] == pytest.approx(row["song_seconds"] / 0.75, abs=1e-3)
 
 
@@ -64,6 +65,7 @@ def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) ->
 
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "&lt;b&gt;Bach &amp; Söhne" in html
+    assert "effort 2" in html
     sources = Page(html).sources
     assert len(sources) == 4
     assert all(source.startswith("data:") for source in sources)

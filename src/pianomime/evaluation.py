@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import queue
 from collections import Counter
@@ -16,7 +17,7 @@ from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.files import atomic
-from pianomime.play import EFFORT, SECONDS, Player
+from pianomime.play import EFFORT, SECONDS, check_player
 from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
 
@@ -56,17 +57,17 @@ def evaluate(
         effort: how hard the player tries, 0 to 3.
 
     Returns:
-        What `results.json` holds: `player`, `effort`, `songs` (a row each, in the order of
-        `paths`), `mean` (of every number, over the songs that did not fail; empty if all did)
-        and `causes` (`missed` and `wrong`: the share of the key-frames wanted in all songs that
-        each cause cost, the costliest first).
+        What `results.json` holds: `player`, `effort` and `seconds` as asked for (None: whole
+        songs), `songs` (a row each, in the order of `paths`), `mean` (of what was measured, over the
+        songs that did not fail; empty if all did) and `causes` (`missed` and `wrong`: the share
+        of the key-frames wanted in all songs that each cause cost, the costliest first).
 
     Raises:
         InputError: a path stands for no song, or there is no such player.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
-    Player.from_name(player, effort)
+    check_player(player, effort)
     if not seconds > 0:
         raise InputError(f"seconds must be more than 0, not {seconds:g}")
     if jobs is not None and jobs < 1:
@@ -75,11 +76,12 @@ def evaluate(
 
     rows: dict[Path, Row] = {}
 
-    def finish(song: Path, row: Row) -> None:
-        rows[song] = row
+    def tell() -> None:
         if progress is not None:
             f1 = [row["f1"] for row in rows.values() if "error" not in row]
-            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else float("nan"))
+            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else math.nan)
+
+    tell()
 
     waiting = []
     for song in songs:
@@ -87,16 +89,19 @@ def evaluate(
         if known is None:
             waiting.append(song)
         else:
-            finish(song, known)
+            rows[song] = known
+            tell()
     with closing(_play_all(waiting, player, effort, seconds, jobs or _cores())) as played:
         for song, row in played:
             if store is not None and "error" not in row:
                 store.put(song, row)
-            finish(song, row)
+            rows[song] = row
+            tell()
 
     results = {
         "player": player,
         "effort": effort,
+        "seconds": seconds if math.isfinite(seconds) else None,
         "songs": [rows[song] for song in songs],
         "mean": _mean(list(rows.values())),
         "causes": _causes(list(rows.values())),
@@ -153,6 +158,7 @@ def _mean(rows: list[Row]) -> dict[str, float]:
     if not good:
         return {}
     names = [name for name, value in good[0].items() if isinstance(value, int | float)]
+    names.remove("effort")
     return {name: round(sum(row[name] for row in good) / len(good), 6) for name in names}
 
 

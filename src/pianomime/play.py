@@ -12,8 +12,14 @@ import numpy as np
 from pianomime.errors import InputError
 from pianomime.music import Score
 from pianomime.performance import Performance
-from pianomime.plan import Planner
-from pianomime.track.tracker import Tracker
+from pianomime.plan import Planner, ZeroShotPlanner
+from pianomime.track import (
+    DynamicTracker,
+    IkTracker,
+    RolloutConfig,
+    RolloutTracker,
+    Tracker,
+)
 from pianomime.world import World
 
 Progress = Callable[[str, int, int], None]
@@ -27,14 +33,14 @@ SECONDS = 30.0
 
 
 def excerpt(score: Score, start: float = 0.0, seconds: float = SECONDS) -> Score:
-    """The part of a score that is played: from the first sound at or after `start`.
+    """The part of a score that is played, from what sounds at `start` or first after it.
 
     Leading silence is left out, as in the paper's protocol, so that it neither costs time nor
     counts as perfect playing.
 
     Args:
         score: the whole song.
-        start: where to begin looking for the first note [s].
+        start: where to begin [s]; a note that began before and still sounds is part of it.
         seconds: length of the excerpt at most [s]; may be infinite.
 
     Raises:
@@ -51,6 +57,22 @@ def excerpt(score: Score, start: float = 0.0, seconds: float = SECONDS) -> Score
     return score.clip(start, math.inf).trim_silence().clip(0.0, seconds)
 
 
+def check_player(name: str, effort: int) -> None:
+    """Refuse what `Player.from_name` would, without making a player.
+
+    Args:
+        name: one of `PLAYERS`.
+        effort: 0 to 3.
+
+    Raises:
+        InputError: there is no such player, or no such effort; the message lists those there are.
+    """
+    if effort not in range(4):
+        raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
+    if name not in PLAYERS:
+        raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
+
+
 @dataclass(frozen=True)
 class Player:
     """Plays scores: the planner decides where the fingertips go, the tracker gets them there.
@@ -59,11 +81,13 @@ class Player:
         name: what reports call it.
         planner: makes a FingertipPlan of a Score.
         tracker: makes controls of the plan and the state of the World.
+        effort: how hard it tries, 0 to 3; 0 for one that does not search.
     """
 
     name: str
     planner: Planner
     tracker: Tracker
+    effort: int = 0
 
     @classmethod
     def from_name(cls, name: str, effort: int = EFFORT) -> Player:
@@ -78,10 +102,7 @@ class Player:
             InputError: there is no such player, or no such effort; the message lists those
                 there are.
         """
-        if effort not in range(4):
-            raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
-        if name not in PLAYERS:
-            raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
+        check_player(name, effort)
         return PLAYERS[name](effort)
 
     def play(self, score: Score, progress: Progress | None = None) -> Performance:
@@ -118,6 +139,7 @@ class Player:
         return Performance(
             score=score,
             player=self.name,
+            effort=self.effort,
             plan=plan,
             ctrl=ctrl,
             qpos=qpos,
@@ -131,19 +153,13 @@ class Player:
 
 
 def _zero_shot(effort: int) -> Player:
-    from pianomime.plan import ZeroShotPlanner
-    from pianomime.track import DynamicTracker, RolloutConfig, RolloutTracker
-
     tracker: Tracker = DynamicTracker()
     if effort:
         tracker = RolloutTracker(tracker, RolloutConfig.of_effort(effort))
-    return Player("zero-shot", ZeroShotPlanner(), tracker)
+    return Player("zero-shot", ZeroShotPlanner(), tracker, effort)
 
 
-def _zero_shot_ik(effort: int) -> Player:
-    from pianomime.plan import ZeroShotPlanner
-    from pianomime.track import IkTracker
-
+def _zero_shot_ik(_: int) -> Player:
     return Player("zero-shot-ik", ZeroShotPlanner(), IkTracker())
 
 
@@ -153,5 +169,6 @@ PLAYERS: dict[str, Callable[[int], Player]] = {
 }
 """Every player by name, given the effort.
 
-A new one is one more line, with the import inside its function.
+A new one is one more line; what others need not wait for, such as learned weights, it imports and
+loads inside its function.
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -53,8 +54,12 @@ class Evaluate:
                 self.seconds,
                 self.jobs,
                 out,
-                progress=lambda done, total, f1: tell("songs", done, total, f"mean F1 {f1:.3f}"),
+                progress=lambda done, total, f1: tell("songs", done, total, _remark(f1)),
                 effort=self.effort,
             )
         print(markdown(results))
         print(f"saved: {out / 'results.json'}")
+
+
+def _remark(f1: float) -> str:
+    return "" if math.isnan(f1) else f"mean F1 {f1:.3f}"

@@ -37,7 +37,7 @@ class Play:
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
     """How hard to try: 0 plays straight away, 1 to 3 try out variations of what goes wrong."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
-    """How much to play at most, from the first note at or after START [s]."""
+    """How much to play at most, from what sounds at START or first after it [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in the song to begin [s]."""
     video: bool = True

@@ -68,7 +68,8 @@ footer { color: var(--faint); font-size: .85rem; }
 <body>
 <main>
 <h1>$song</h1>
-<p class="under">Played by two simulated Shadow hands &middot; player <b>$player</b></p>
+<p class="under">Played by two simulated Shadow hands &middot; player <b>$player</b>,
+effort $effort</p>
 $warning<dl class="tiles">
 $tiles</dl>
 $film<section>
@@ -159,6 +160,7 @@ def page(
     return _PAGE.substitute(
         song=escape(str(numbers["song"])),
         player=escape(str(numbers["player"])),
+        effort=numbers["effort"],
         version=escape(version),
         tiles="".join(tiles),
         rows="".join(rows),
