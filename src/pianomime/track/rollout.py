@@ -27,13 +27,13 @@ _FINGERS = [slice(2, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 2
 class RolloutConfig:
     """How hard to try."""
 
-    variations: int = 32
+    variations: int = 16
     """Variations that are rolled out side by side."""
     rounds: int = 1
     """Times that variations of the best so far are drawn."""
     commit: int = 4
     """Frames that are played before looking ahead again."""
-    ahead: int = 10
+    ahead: int = 8
     """Frames that are looked ahead."""
     knots: int = 4
     """Frames between the points that a variation is drawn at."""
@@ -53,7 +53,11 @@ class RolloutConfig:
     @classmethod
     def of_effort(cls, effort: int) -> RolloutConfig:
         """The settings of efforts 1 to 3: each tries several times as much as the one before."""
-        return {1: cls(), 2: cls(rounds=3), 3: cls(variations=64, rounds=6)}[effort]
+        return {
+            1: cls(),
+            2: cls(variations=32, rounds=2, ahead=10),
+            3: cls(variations=64, rounds=5, ahead=10),
+        }[effort]
 
 
 class RolloutTracker:
