@@ -289,7 +289,7 @@ def test_what_cannot_be_explained_is_one_line(
         (["missing.npz"], "missing.npz"),
         (["text.npz"], "text.npz: not a performance"),
         (["other.npz"], "other.npz: not a performance"),
-        (["."], "not a performance"),
+        (["."], "directory"),
         (["no plan.npz"], "no plan.npz: made up played it without a fingertip plan"),
         ([str(saved), "no plan.npz"], "no plan.npz"),
         ([], "no performance to explain"),

@@ -1,10 +1,14 @@
 from __future__ import annotations
 
-from dataclasses import fields
+import contextlib
+import io
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import made_up
 from pianomime import Performance
@@ -50,12 +54,54 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.M
     assert [file.name for file in tmp_path.iterdir()] == ["performance.npz"]
 
 
-@pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04 half a zip"])
+def npy() -> bytes:
+    file = io.BytesIO()
+    np.save(file, np.arange(3))
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("content", [b"", b"text", b"PK\x03\x04 half a zip", npy()])
 def test_what_is_no_performance_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "performance.npz"
     path.write_bytes(content)
+    with pytest.raises(InputError, match=r": not a performance, or a damaged one$"):
+        Performance.load(path)
+
+
+@given(at=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7), cut=st.booleans())
+@settings(max_examples=60, deadline=None)
+def test_a_damaged_file_is_refused_or_harmless(
+    tmp_path_factory: pytest.TempPathFactory, at: float, bit: int, cut: bool
+) -> None:
+    path = tmp_path_factory.mktemp("damaged") / "performance.npz"
+    made_up.performance(made_up.score(notes=5, seconds=1.0)).save(path)
+    content = bytearray(path.read_bytes())
+    place = int(at * len(content))
+    if cut:
+        del content[place:]
+    else:
+        content[place] ^= 1 << bit
+    path.write_bytes(content)
+    with contextlib.suppress(InputError):
+        Performance.load(path).metrics()
+
+
+@pytest.mark.parametrize("name", ["ctrl", "pressed", "pedal", "plan_finger_key", "score_key"])
+def test_arrays_that_do_not_fit_together_are_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "performance.npz"
+    made_up.performance(made_up.score()).save(path)
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays[name] = arrays[name][:-1]
+    np.savez(path, **arrays)
     with pytest.raises(InputError, match="not a performance"):
         Performance.load(path)
+
+
+def test_a_plan_for_another_score_does_not_fit() -> None:
+    performance = made_up.performance(made_up.score())
+    with pytest.raises(ValueError, match="59 notes"):
+        replace(performance, plan=made_up.plan(made_up.score(notes=59)))
 
 
 def test_other_arrays_and_other_versions_are_refused(tmp_path: Path) -> None:

@@ -58,9 +58,10 @@ def evaluate(
 
     Returns:
         What `results.json` holds: `player`, `effort` and `seconds` as asked for (None: whole
-        songs), `songs` (a row each, in the order of `paths`), `mean` (of what was measured, over the
-        songs that did not fail; empty if all did) and `causes` (`missed` and `wrong`: the share
-        of the key-frames wanted in all songs that each cause cost, the costliest first).
+        songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was measured,
+        over the songs that did not fail; empty if all did) and `causes` (`missed` and `wrong`:
+        the share of the key-frames wanted in all songs that each cause cost, the costliest
+        first).
 
     Raises:
         InputError: a path stands for no song, or there is no such player.

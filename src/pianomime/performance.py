@@ -7,8 +7,8 @@ rendered again without simulating.
 from __future__ import annotations
 
 import os
-import zipfile
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,8 @@ _VELOCITY = 64
 _VERSION = 2
 _SCORE = ("key", "onset", "offset", "velocity", "pedal")
 _PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
-_FRAMES = ("ctrl", "qpos", "key_state", "pressed", "pedal", "blow_ups")
+_COLUMNS = {"ctrl": (46,), "qpos": (142,), "key_state": (88,), "pressed": (88,), "pedal": ()}
+_FRAMES = (*_COLUMNS, "blow_ups")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,27 @@ class Performance:
     blow_ups: NDArray[np.int64]
     plan_seconds: float
     simulate_seconds: float
+
+    def __post_init__(self) -> None:
+        """Refuse arrays that do not fit together.
+
+        Raises:
+            ValueError: an array has another shape than it should.
+        """
+        frames = self.score.frames()
+        for name, columns in _COLUMNS.items():
+            shape = getattr(self, name).shape
+            if shape != (frames, *columns):
+                raise ValueError(f"{name} has shape {shape}, not {(frames, *columns)}")
+        if not ((self.blow_ups >= 0) & (self.blow_ups < frames)).all():
+            raise ValueError(f"blow_ups must be frames 0..{frames - 1}")
+        if self.plan is not None:
+            planned = len(self.plan.fingertips), len(self.plan.note_hand)
+            if planned != (frames, len(self.score)):
+                raise ValueError(
+                    f"a plan of {planned[0]} frames and {planned[1]} notes "
+                    f"for a score of {frames} and {len(self.score)}"
+                )
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -148,38 +170,44 @@ class Performance:
             path: the .npz file.
 
         Raises:
-            FileNotFoundError: there is no such file.
+            OSError: there is no such file, or it cannot be read.
             InputError: it is no performance, or one of a version that we do not know.
         """
         try:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
             version = int(arrays["version"])
-            if version != _VERSION:
-                raise InputError(
-                    f"{path}: a performance of version {version}; this program reads {_VERSION}: "
-                    "play the song again"
-                )
-            score = Score(
-                **{name: arrays[f"score_{name}"] for name in _SCORE},
-                title=str(arrays["score_title"]),
-            )
-            plan = None
-            if "plan_fingertips" in arrays:
-                plan = FingertipPlan(**{name: arrays[f"plan_{name}"] for name in _PLAN})
-            return cls(
-                score=score,
-                player=str(arrays["player"]),
-                effort=int(arrays["effort"]),
-                plan=plan,
-                **{name: arrays[name] for name in _FRAMES},
-                plan_seconds=float(arrays["plan_seconds"]),
-                simulate_seconds=float(arrays["simulate_seconds"]),
-            )
-        except (FileNotFoundError, InputError):
+            made = cls._from_arrays(arrays) if version == _VERSION else None
+        except (FileNotFoundError, IsADirectoryError, PermissionError):
             raise
-        except (KeyError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
-            raise InputError(f"{path}: not a performance ({error})") from error
+        except Exception as error:
+            # On damaged data zipfile, zlib and numpy raise all kinds of errors, and what they say,
+            # such as to allow pickles, is no advice for a user.
+            raise InputError(f"{path}: not a performance, or a damaged one") from error
+        if made is None:
+            raise InputError(
+                f"{path}: a performance of version {version}; this program reads {_VERSION}: "
+                "play the song again"
+            )
+        return made
+
+    @classmethod
+    def _from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Performance:
+        score = Score(
+            **{name: arrays[f"score_{name}"] for name in _SCORE}, title=str(arrays["score_title"])
+        )
+        plan = None
+        if "plan_fingertips" in arrays:
+            plan = FingertipPlan(**{name: arrays[f"plan_{name}"] for name in _PLAN})
+        return cls(
+            score=score,
+            player=str(arrays["player"]),
+            effort=int(arrays["effort"]),
+            plan=plan,
+            **{name: arrays[name] for name in _FRAMES},
+            plan_seconds=float(arrays["plan_seconds"]),
+            simulate_seconds=float(arrays["simulate_seconds"]),
+        )
 
 
 def _frames(onset: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.int64]:
