@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -137,6 +138,62 @@ def test_evaluate_refuses_what_makes_no_sense(capsys: pytest.CaptureFixture[str]
     assert "zero-shot" in fails(["evaluate", "ode-to-joy", "--player", "liszt"], capsys)
     assert "jobs" in fails(["evaluate", "ode-to-joy", "--jobs", "0"], capsys)
     assert "is a file" in fails(["evaluate", "ode-to-joy", "-o", "file"], capsys)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["play"], "Missing from pianomime play: SONG"),
+        (["play", "ode-to-joy", "--seconds", "x"], "--seconds: could not convert"),
+        (["play", "ode-to-joy", "--secnds", "3"], "Unrecognized options: --secnds"),
+        (["play", "ode-to-joy", "another"], "another"),
+        (["play", "ode-to-joy", "--seconds"], "--seconds"),
+        (["evaluate", "ode-to-joy", "--jobs", "1.5"], "--jobs"),
+        (["songs", "all"], "all"),
+    ],
+)
+@pytest.mark.parametrize("columns", ["40", "80", "200"])
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_wrong_usage_is_one_line_with_a_hint(
+    arguments: list[str],
+    message: str,
+    columns: str,
+    encoding: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding=encoding))
+    line = fails(arguments, capsys)
+    assert message in line
+    assert line.endswith(f" (see pianomime {arguments[0]} --help)")
+    assert line.isprintable()
+    assert not set("│─╭╮╰╯") & set(line)
+    assert "---" not in line
+    assert "A MIDI file" not in line
+
+
+def test_a_song_with_no_name_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "no name" in fails(["play", ""], capsys)
+    assert "no name" in fails(["evaluate", "ode-to-joy", " "], capsys)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no such pipes on Windows")
+@pytest.mark.parametrize("arguments", [["songs"], ["--help"], ["songs", "--help"]])
+def test_nothing_is_said_where_nobody_reads_on(arguments: list[str]) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "pianomime", *arguments],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writer)
+    assert done.returncode == 141
+    assert done.stderr == ""
 
 
 def test_an_unknown_command_is_refused_with_a_list(capsys: pytest.CaptureFixture[str]) -> None:

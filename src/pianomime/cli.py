@@ -1,14 +1,18 @@
 """The front door: finds the command, parses its typed config, runs it.
 
 Nothing heavy is imported before the command is known and its arguments are right. An error in
-what the user gave is one line on stderr and exit code 2; Ctrl-C is exit code 130.
+what the user gave is one line on stderr and exit code 2; Ctrl-C is exit code 130. Where nobody
+reads on, as in `pianomime songs | head -1`, it ends with 141, as if by SIGPIPE, and says nothing.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import inspect
+import io
 import os
+import re
 import sys
 import warnings
 from typing import NamedTuple, NoReturn, Protocol
@@ -81,18 +85,24 @@ def main(arguments: list[str] | None = None) -> None:
         arguments: what follows `pianomime`; None for those of this process.
 
     Raises:
-        SystemExit: with code 2 for bad input, 130 for Ctrl-C, 0 after `--help` or `--version`.
+        SystemExit: with code 2 for bad input, 130 for Ctrl-C, 141 when nobody reads what it prints,
+            0 after `--help` or `--version`.
     """
     try:
         with warnings.catch_warnings():
             # A user has no use for the line of our source that a warning points at.
             warnings.showwarning = _warn
             _run((sys.argv[1:] if arguments is None else arguments) or ["--help"])
+        sys.stdout.flush()
     except KeyboardInterrupt:
         print("pianomime: stopped", file=sys.stderr)
         sys.exit(130)
     except InputError as error:
         _fail(error)
+    except BrokenPipeError:
+        # Python flushes once more when it ends: let it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(141)
     except OSError as error:
         _fail(_one_line(error))
 
@@ -106,12 +116,42 @@ def _run(arguments: list[str]) -> None:
     elif name not in COMMANDS:
         raise InputError(f"there is no command {name!r}; there are: {', '.join(COMMANDS)}")
     else:
-        import tyro
+        _parse(name, rest).run()
 
-        module, config, _ = COMMANDS[name]
-        kind = getattr(importlib.import_module(module), config)
-        # Given in full: left to itself, tyro leaves out the examples.
-        command: Runnable = tyro.cli(
-            kind, prog=f"pianomime {name}", description=inspect.cleandoc(kind.__doc__), args=rest
-        )
-        command.run()
+
+def _parse(name: str, arguments: list[str]) -> Runnable:
+    import tyro
+
+    module, config, _ = COMMANDS[name]
+    kind = getattr(importlib.import_module(module), config)
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            # Given in full: left to itself, tyro leaves out the examples.
+            command: Runnable = tyro.cli(
+                kind,
+                prog=f"pianomime {name}",
+                description=inspect.cleandoc(kind.__doc__),
+                args=arguments,
+            )
+    except SystemExit as stopped:
+        if not stopped.code:
+            raise
+        raise InputError(f"{_gist(said.getvalue())} (see pianomime {name} --help)") from None
+    return command
+
+
+def _gist(box: str) -> str:
+    """What is wrong, in one line, of the box that tyro draws around it and its advice."""
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", box)
+    title, *lines = [line.strip("│╭╮╰╯").rstrip() for line in plain.splitlines()] or [""]
+    gist: list[str] = []
+    for line in lines:
+        text = line.lstrip()
+        if text.strip("─-"):
+            margin = len(line) - len(text)
+            if margin < 8:  # Further in, there is the help of an option.
+                gist.append(text)
+        elif gist:
+            break  # Below the rule there is advice.
+    return " ".join(gist) or title.strip(" ─") or "these arguments are not understood"

@@ -18,8 +18,10 @@ def find_song(name: str) -> Path:
         name: path of a file, or name of a bundled song or a part of it: "ode to joy" will do.
 
     Raises:
-        InputError: there is neither; the message lists the bundled songs.
+        InputError: there is neither, or no name.
     """
+    if not name.strip():
+        raise InputError("a song with no name; `pianomime songs` lists those there are")
     path = Path(name)
     if path.is_dir():
         raise InputError(f"{name}: is a folder; name one song, or use `pianomime evaluate`")
