@@ -51,7 +51,8 @@ def evaluate(
         paths: MIDI files, folders of them, or names of bundled songs.
         player: name of the player.
         seconds: how much of each song to play at most, from its first note [s].
-        jobs: processes; one a core if None.
+        jobs: processes; one a core that this one may use if None. They share the cores, so
+            `realtime_factor` and the times depend on it.
         out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
         progress: told how far it is.
         effort: how hard the player tries, 0 to 3.

@@ -28,11 +28,13 @@ class Evaluate:
     player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
     """Name of the player."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
-    """How hard to try: 0 plays straight away, 1 to 3 try out variations of what goes wrong."""
+    """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
+    On two cores 1 takes about as long as the music or less, 2 and 3 several times longer."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much of each song to play at most, from its first note [s]."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Songs played at the same time; one a core if not given."""
+    """Songs played at the same time; one a core if not given. They slow each other down: compare
+    real time only between runs with the same N."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the results; out/evaluate-PLAYER-EFFORT if not given."""
 
