@@ -1,4 +1,4 @@
-"""Time and memory of `pianomime play`, without the film, on one core.
+"""Time and memory of `pianomime play`, without the film, on as many cores as asked for.
 
 Every song is played by the command itself in a fresh process: peak memory and whole time are that
 process's own, with imports, sound and report; planning and simulating are what its report says.
@@ -19,10 +19,11 @@ from typing import Any
 
 import common
 from pianomime import songs
+from pianomime.play import EFFORT
 from pianomime.song_files import find_songs
 
 
-def play(song: Path, seconds: float, core: int) -> dict[str, Any]:
+def play(song: Path, seconds: float, effort: int, cores: list[int]) -> dict[str, Any]:
     """The figures of one song, or its error."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "out")
@@ -30,12 +31,12 @@ def play(song: Path, seconds: float, core: int) -> dict[str, Any]:
         process = subprocess.Popen(
             [
                 *(sys.executable, "-m", "pianomime", "play", str(song), "-o", str(out)),
-                *("--no-video", "--seconds", str(seconds)),
+                *("--no-video", "--seconds", str(seconds), "--effort", str(effort)),
             ],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=lambda: os.sched_setaffinity(0, {core}),
+            preexec_fn=lambda: os.sched_setaffinity(0, cores),
         )
         assert process.stderr is not None
         error = process.stderr.read()
@@ -61,14 +62,20 @@ def main() -> None:
     )
     options.add_argument("--seconds", type=float, default=30.0, help="of each song (%(default)s)")
     options.add_argument("--rounds", type=int, default=1)
+    options.add_argument("--effort", type=int, default=EFFORT, help="0 to 3 (%(default)s)")
+    options.add_argument("--cores", type=int, default=1, help="to play on (%(default)s)")
     arguments = options.parse_args()
     facts = common.machine()
     common.show_machine(facts)
-    core = max(common.cores())
+    if not 1 <= arguments.cores <= len(common.cores()):
+        options.error(f"--cores must be 1 to {len(common.cores())}")
+    cores = common.cores()[-arguments.cores :]
     files = find_songs(arguments.songs or songs.names())
     rows = []
     for file in files:
-        runs = [play(file, arguments.seconds, core) for _ in range(arguments.rounds)]
+        runs = [
+            play(file, arguments.seconds, arguments.effort, cores) for _ in range(arguments.rounds)
+        ]
         failed = [run for run in runs if "error" in run]
         rows.append(failed[0] if failed else _median(runs))
         print(".", end="", flush=True)
@@ -84,7 +91,8 @@ def main() -> None:
     for row in rows:
         if "error" in row:
             print(f"{row['song']}: {row['error']}")
-    common.report(arguments.output, facts, {"seconds": arguments.seconds, "songs": rows})
+    settings = {name: getattr(arguments, name) for name in ("seconds", "effort", "cores")}
+    common.report(arguments.output, facts, {**settings, "songs": rows})
 
 
 def _median(runs: list[dict[str, Any]]) -> dict[str, Any]:
