@@ -14,5 +14,5 @@ def shared() -> Path:
     beside = Path(__file__).parents[2] / "shared"
     folder = Path(os.environ.get("PIANOMIME_SHARED", beside))
     if not folder.is_dir():
-        pytest.skip(f"no reference data at {folder} (PIANOMIME_SHARED names another place)")
+        pytest.skip("no reference data (PIANOMIME_SHARED names its folder)")
     return folder

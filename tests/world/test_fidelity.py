@@ -29,8 +29,7 @@ def test_experts_play_open_loop(fidelity: ModuleType, clips: list[Any]) -> None:
     f1, blow_ups = zip(
         *((metrics.f1, broken) for metrics, broken in map(fidelity.replay, clips[::3])), strict=True
     )
-    # As measured over these three clips; a change of the world that matters moves it.
-    assert np.mean(f1) == pytest.approx(0.904, abs=0.03)
+    assert np.mean(f1) >= 0.88  # 0.905 measured, over these three clips
     assert sum(blow_ups) == 0
 
 
