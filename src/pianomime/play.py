@@ -14,6 +14,7 @@ from pianomime.music import Score
 from pianomime.performance import Performance
 from pianomime.plan import Planner
 from pianomime.track.tracker import Tracker
+from pianomime.video.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.world import World
 
 Progress = Callable[[str, int, int], None]
@@ -72,9 +73,28 @@ class Player:
         Raises:
             InputError: there is no such player; the message lists those there are.
         """
+        if name in DEMONSTRATION_PLAYERS:
+            raise InputError(f"the player {name!r} plays demonstrations (.npz), not MIDI files")
         if name not in PLAYERS:
             raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
         return PLAYERS[name]()
+
+    @classmethod
+    def from_demonstration(cls, demonstration: Demonstration, name: str = "") -> Player:
+        """A player that plays one score with the fingertips of the human who demonstrated it.
+
+        Args:
+            demonstration: whose score it plays.
+            name: one of `DEMONSTRATION_PLAYERS`; the first if not given.
+
+        Raises:
+            InputError: there is no such player; the message lists those there are.
+        """
+        name = name or next(iter(DEMONSTRATION_PLAYERS))
+        if name not in DEMONSTRATION_PLAYERS:
+            there = ", ".join([*DEMONSTRATION_PLAYERS, *PLAYERS])
+            raise InputError(f"there is no player {name!r} of demonstrations; there are: {there}")
+        return cls(name, DemonstrationPlanner(demonstration), DEMONSTRATION_PLAYERS[name]())
 
     def play(self, score: Score, progress: Progress | None = None) -> Performance:
         """Perform a score from the rest pose; the same score gives the same performance.
@@ -141,3 +161,22 @@ PLAYERS: dict[str, Callable[[], Player]] = {
     "zero-shot-ik": _zero_shot_ik,
 }
 """Every player by name. A new one is one more line, with the import inside its function."""
+
+
+def _dynamic_tracker() -> Tracker:
+    from pianomime.track import DynamicTracker
+
+    return DynamicTracker()
+
+
+def _ik_tracker() -> Tracker:
+    from pianomime.track import IkTracker
+
+    return IkTracker()
+
+
+DEMONSTRATION_PLAYERS: dict[str, Callable[[], Tracker]] = {
+    "demonstration": _dynamic_tracker,
+    "demonstration-ik": _ik_tracker,
+}
+"""Every player of demonstrations by name, with its tracker."""

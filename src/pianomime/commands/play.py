@@ -11,6 +11,8 @@ import tyro
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from pianomime.music import Score
+    from pianomime.play import Player
     from pianomime.report import Row
 
 
@@ -25,14 +27,16 @@ class Play:
       pianomime play ode-to-joy
       pianomime play SONG.mid -o out/song --no-video
       pianomime play SONG.mid --start 60 --seconds 180
+      pianomime play DEMO.npz --player demonstration-ik
     """
 
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
-    """A MIDI file, or the name of a bundled song (see `pianomime songs`)."""
+    """A MIDI file, a demonstration (see `pianomime retarget`), or the name of a bundled song (see
+    `pianomime songs`)."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the report; out/NAME if not given."""
-    player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
-    """Name of the player."""
+    player: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Name of the player; zero-shot if not given, and for demonstrations, demonstration."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much to play at most, from the first note at or after START [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
@@ -50,15 +54,10 @@ class Play:
         from rich.console import Console
 
         from pianomime.commands.progress import bars
-        from pianomime.music import Score
-        from pianomime.play import Player, excerpt
         from pianomime.report import FILES, staged, write_report
-        from pianomime.song_files import find_song
 
-        player = Player.from_name(self.player)
-        midi = find_song(self.song)
-        score = excerpt(Score.from_midi(midi), self.start, self.seconds)
-        out = self.out or Path("out", midi.stem)
+        player, score, name = self._cast()
+        out = self.out or Path("out", name)
         notes: list[str] = []
         with staged(out, FILES) as folder, bars() as tell:
             row = write_report(
@@ -68,6 +67,26 @@ class Play:
         for note in notes:
             print(note)
         print(f"look and listen: {out / 'report.html'}")
+
+    def _cast(self) -> tuple[Player, Score, str]:
+        """Who plays what, and the name of its file."""
+        from pianomime.music import Score
+        from pianomime.play import PLAYERS, Player, excerpt
+        from pianomime.song_files import find_song
+
+        if Path(self.song).suffix == ".npz":
+            from pianomime.video.demonstration import Demonstration
+
+            shown = Demonstration.load(self.song).excerpt(self.start, self.seconds)
+            if self.player in PLAYERS:
+                player = Player.from_name(self.player)
+            else:
+                player = Player.from_demonstration(shown, self.player or "")
+            return player, shown.score, Path(self.song).stem
+        player = Player.from_name(self.player or "zero-shot")
+        midi = find_song(self.song)
+        score = excerpt(Score.from_midi(midi), self.start, self.seconds)
+        return player, score, midi.stem
 
 
 def _table(row: Row) -> Table:

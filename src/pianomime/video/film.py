@@ -18,6 +18,9 @@ from pianomime.errors import InputError
 _WIDEST = 1280
 """Larger pictures are shrunk to this size [pixels]: hands and keys are plain enough in them."""
 
+_STRIDE = 15
+"""Frames."""
+
 _SHRINKING = av.video.reformatter.Interpolation.AREA
 
 
@@ -97,8 +100,10 @@ class Film:
     def sample(self, count: int) -> list[NDArray[np.uint8]]:
         """Pictures from all over the video, without decoding all of it."""
         pictures = []
+        visits: dict[float, int] = {}
         with self._open() as container:
             stream = container.streams.video[0]
+            stream.thread_type = "AUTO"
             for number in range(count):
                 if self.seconds:
                     goal = self._start + self.seconds * (number + 0.5) / count
@@ -106,9 +111,16 @@ class Film:
                         container.seek(int(goal / stream.time_base), stream=stream)
                     except av.error.FFmpegError:
                         continue
-                # Up to a little past the key frame: one key frame may serve several seconds.
+                # Only key frames can be reached at once; where several goals lead to the same
+                # one, go on a little farther each time.
+                skip = 0
                 for frame in self._decode(container, stream):
-                    if not self.seconds or frame.time is None or frame.time >= goal - 0.5:
+                    if skip == 0:
+                        key = frame.time or 0.0
+                        visits[key] = visits.get(key, -1) + 1
+                        skip = 1 + _STRIDE * visits[key]
+                    skip -= 1
+                    if skip == 0:
                         pictures.append(self._picture(0.0, frame, None).picture)
                         break
         return pictures

@@ -58,10 +58,7 @@ def cache_folder() -> Path:
     """Where downloaded files are kept: PIANOMIME_CACHE, or a folder in the user's cache."""
     if "PIANOMIME_CACHE" in os.environ:
         return Path(os.environ["PIANOMIME_CACHE"])
-    if os.name == "nt":
-        home = os.environ.get("LOCALAPPDATA")
-    else:
-        home = os.environ.get("XDG_CACHE_HOME")
+    home = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
     return Path(home or Path.home() / ".cache", "pianomime")
 
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_closing
 from scipy.signal import savgol_filter
 
 from pianomime.plan import LEFT, RIGHT
 from pianomime.video.hand_detector import Sighting
 from pianomime.video.plane import Plane
-
-RATE = 20.0
-"""Frames a second."""
+from pianomime.video.stretches import stretches
 
 _SAME_HAND = 0.05
 """[m] Two sightings whose points are nearer than this on average are one hand seen twice."""
@@ -26,6 +24,8 @@ _GHOST = 3.0
 """Cost of taking a sighting for no hand at all."""
 _ORDER = 4.0
 """Cost of the right hand lying to the left of the left one."""
+_HISTORIES = 3
+"""Ways to tell the hands apart that are followed."""
 _STRAY = 0.025
 """[m] A point this far from where its neighbours in time have it was seen wrongly."""
 _SMOOTH = 5
@@ -59,7 +59,9 @@ class HandTracks:
         return len(self.points)
 
 
-def follow(sightings: Sequence[Sequence[Sighting]], size: tuple[int, int], plane: Plane) -> HandTracks:
+def follow(
+    sightings: Sequence[Sequence[Sighting]], size: tuple[int, int], plane: Plane
+) -> HandTracks:
     """Decide over the whole clip which sighting is which hand, then repair.
 
     Args:
@@ -126,12 +128,15 @@ def _assign(seen: list[list[_Seen]], mirrored: bool) -> tuple[list[tuple[int, in
         ]
         following: dict[tuple[int, int], _History] = {}
         came_from: dict[tuple[int, int], tuple[int, int]] = {}
-        for option in dict.fromkeys(options):
-            best, parent = min(
-                ((history.after(frame, option, mirrored), key) for key, history in histories.items()),
-                key=lambda each: each[0].cost,
-            )
-            following[option], came_from[option] = best, parent
+        # Those far behind do not catch up.
+        leading = sorted(histories, key=lambda key: histories[key].cost)[:_HISTORIES]
+        for key in leading:
+            history = histories[key]
+            moves = history.moves(frame)
+            for option in dict.fromkeys(options):
+                longer = history.after(frame, option, moves, mirrored)
+                if option not in following or longer.cost < following[option].cost:
+                    following[option], came_from[option] = longer, key
         histories = following
         back.append(came_from)
     if not seen:
@@ -163,26 +168,47 @@ class _History:
     def start() -> _History:
         return _History(0.0, (None, None), (0, 0))
 
-    def after(self, frame: list[_Seen], option: tuple[int, int], mirrored: bool) -> _History:
+    def moves(self, frame: list[_Seen]) -> list[list[float]]:
+        """What it costs each hand to have gone to each sighting."""
+        return [
+            [
+                0.0
+                if before is None
+                # The longer unseen, the farther it may have gone.
+                else min((_distance(points, before) / _JUMP) ** 2 / (1 + age), 6.0)
+                for points, _ in frame
+            ]
+            for before, age in zip(self.last, self.age, strict=True)
+        ]
+
+    def after(
+        self,
+        frame: list[_Seen],
+        option: tuple[int, int],
+        moves: list[list[float]],
+        mirrored: bool,
+    ) -> _History:
+        """The history that goes on with an option: the sighting of each hand, -1 for none."""
         cost = self.cost + _GHOST * (len(frame) - sum(which >= 0 for which in option))
-        last: list[NDArray[np.float64] | None] = list(self.last)
-        age = [years + 1 for years in self.age]
+        last = list(self.last)
+        age = [frames + 1 for frames in self.age]
         for hand, which in enumerate(option):
             if which < 0:
                 continue
             points, right = frame[which]
             likely = right if (hand == RIGHT) != mirrored else 1 - right
-            cost -= float(np.log(np.clip(likely, 0.05, 0.95)))
-            before = self.last[hand]
-            if before is not None:
-                moved = float(np.linalg.norm(points - before, axis=1).mean())
-                # The longer unseen, the farther it may have gone.
-                cost += min((moved / _JUMP) ** 2 / age[hand], 6.0)
+            cost += moves[hand][which] - math.log(min(max(likely, 0.05), 0.95))
             last[hand], age[hand] = points, 0
-        left, right_hand = last
-        if min(option) >= 0 and left is not None and right_hand is not None:
-            cost += _ORDER * (left[:, 1].mean() > right_hand[:, 1].mean())
+        left, other = last
+        if min(option) >= 0 and left is not None and other is not None:
+            cost += _ORDER * bool(left[:, 1].mean() > other[:, 1].mean())
         return _History(cost, (last[0], last[1]), (age[0], age[1]))
+
+
+def _distance(points: NDArray[np.float64], others: NDArray[np.float64]) -> float:
+    """Mean distance [m] of points (6, 2) from others."""
+    off = points - others
+    return float(np.sqrt((off * off).sum(axis=1)).mean())
 
 
 def _repair(
@@ -219,11 +245,8 @@ def poorly_seen(tracks: HandTracks) -> list[tuple[float, float, int]]:
     Returns:
         From and to [s], and the hand; in order.
     """
-    stretches = []
-    for hand in (LEFT, RIGHT):
-        lost = binary_closing(np.pad(~tracks.found[:, hand], 2), np.ones(3))[2:-2]
-        edges = np.flatnonzero(np.diff(lost.astype(np.int8), prepend=0, append=0))
-        for first, end in edges.reshape(-1, 2):
-            if end - first >= RATE / 2:
-                stretches.append((first / RATE, end / RATE, hand))
-    return sorted(stretches)
+    return sorted(
+        (first, end, hand)
+        for hand in (LEFT, RIGHT)
+        for first, end in stretches(~tracks.found[:, hand])
+    )

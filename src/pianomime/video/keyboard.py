@@ -216,10 +216,7 @@ def _namings(
         at = lines.pixels(u, np.full(len(u), row))
         margin = 0.6 * abs(float(lines.width[0]))
         visible = (
-            (at[:, 0] > margin)
-            & (at[:, 0] < width - margin)
-            & (at[:, 1] > 0)
-            & (at[:, 1] < height)
+            (at[:, 0] > margin) & (at[:, 0] < width - margin) & (at[:, 1] > 0) & (at[:, 1] < height)
         )
         missed = visible & (np.abs(u[:, None] - found[None]).min(axis=1) > 0.4)
         doubt = strange + float(missed.sum())
@@ -364,7 +361,7 @@ def _dip(
     profile: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where each profile (P, S) is darkest, between samples, and how deep the dip is."""
-    complete = np.isfinite(profile).all(axis=1)
+    complete = np.asarray(np.isfinite(profile).all(axis=1))
     filled = np.where(complete[:, None], profile, 0.0)
     lowest = np.clip(filled.argmin(axis=1), 1, len(at) - 2)
     place = at[lowest] + _vertex(filled, lowest) * (at[1] - at[0])
@@ -380,7 +377,7 @@ def _step(
     profile: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Where each profile (P, S) rises most, between samples, and by how much."""
-    complete = np.isfinite(profile).all(axis=1)
+    complete = np.asarray(np.isfinite(profile).all(axis=1))
     filled = np.where(complete[:, None], profile, 0.0)
     wide = max(2, len(at) // 12)
     rise = filled[:, 2 * wide :] - filled[:, : -2 * wide]

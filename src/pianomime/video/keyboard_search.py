@@ -58,11 +58,14 @@ class Lines:
     def pixels(self, u: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
         """(..., 2) column, row of places along the keyboard and across it."""
         s = self.start[0] + self.start[1] * r + (self.width[0] + self.width[1] * r) * u
-        return self.origin + s[..., None] * self.along + r[..., None] * self.across
+        places: NDArray[np.float64] = (
+            self.origin + s[..., None] * self.along + r[..., None] * self.across
+        )
+        return places
 
 
 def black_place(number: NDArray[np.int64]) -> NDArray[np.float64]:
-    """u of black keys, by the number that `Lines.blacks` gives them."""
+    """Places u of black keys, by the number that `Lines.blacks` gives them."""
     return np.asarray(_BLACK_AT[number % 5] + 7 * (number // 5))
 
 
@@ -90,8 +93,7 @@ def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
     along = np.array([np.cos(angle), np.sin(angle)])
     across = np.array([-along[1], along[0]])
     origin = np.array([width, height]) / 2
-    half_s = (abs(along) @ (width, height)) / 2
-    half_r = (abs(across) @ (width, height)) / 2
+    half_s, half_r = (float(np.abs(way) @ [width, height]) / 2 for way in (along, across))
     s = np.arange(-half_s, half_s)
     rows = np.linspace(-half_r, half_r, _LINES)
     places = origin + s[None, :, None] * along + rows[:, None, None] * across

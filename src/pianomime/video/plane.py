@@ -25,7 +25,9 @@ class Plane:
 
     def to_pixels(self, world: ArrayLike) -> NDArray[np.float64]:
         """Pixels (column, row) of world x, y (..., 2) [m]."""
-        return _apply(np.linalg.inv(self.matrix), np.asarray(world, np.float64))
+        return _apply(
+            np.asarray(np.linalg.inv(self.matrix), np.float64), np.asarray(world, np.float64)
+        )
 
     def zoomed(self, factor: float) -> Plane:
         """The plane of the same picture drawn `factor` times as large."""
