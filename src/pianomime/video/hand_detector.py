@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any, NamedTuple
@@ -45,8 +48,10 @@ class HandDetector:
             running_mode=vision.RunningMode.VIDEO,
             num_hands=2,
         )
+        self._chatty = True
         try:
-            self._landmarker = vision.HandLandmarker.create_from_options(options)
+            with _quiet():
+                self._landmarker = vision.HandLandmarker.create_from_options(options)
         except OSError as error:  # its library is loaded only now
             raise InputError(_advice(error)) from error
         except (RuntimeError, ValueError) as error:
@@ -70,9 +75,11 @@ class HandDetector:
             picture: (height, width, 3) red, green, blue.
             milliseconds: when it is; later than the one before.
         """
-        result = self._landmarker.detect_for_video(
-            self._image(image_format=self._format, data=picture), milliseconds
-        )
+        image = self._image(image_format=self._format, data=picture)
+        # It says what it has to say about itself at the first picture.
+        with _quiet() if self._chatty else nullcontext():
+            result = self._landmarker.detect_for_video(image, milliseconds)
+        self._chatty = False
         sightings = []
         for marks, sides in zip(result.hand_landmarks, result.handedness, strict=True):
             points = np.array([[marks[point].x, marks[point].y] for point in _POINTS])
@@ -80,6 +87,20 @@ class HandDetector:
             right = best.score if best.category_name == "Right" else 1 - best.score
             sightings.append(Sighting(points, float(right)))
         return sightings
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what a library writes past Python to stderr off the terminal."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
 
 
 def _mediapipe() -> tuple[Any, Any]:

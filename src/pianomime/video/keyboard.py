@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from pianomime.video.keyboard_search import Lines, black_place, find_lines, sample
+from pianomime.video.keyboard_search import (
+    Lines,
+    black_place,
+    find_lines,
+    line_through,
+    sample,
+)
 from pianomime.video.plane import Plane, fit_plane
 from pianomime.world.figures import BLACK, KEYS, key_centres, key_half_sizes
 
@@ -22,6 +28,8 @@ FAR, FRONT = -0.075, 0.075
 """[m] world x of the two ends of the white keys."""
 BLACK_FRONT = float(key_centres()[1, 0] + key_half_sizes()[1, 0])
 """[m] world x where the black keys end toward the player."""
+_OFF_LINE = 0.003
+"""[m]"""
 LEFT_EDGE = float(key_centres()[0, 1]) - WHITE_WIDTH / 2
 """[m] world y of the left edge of the lowest key."""
 
@@ -342,6 +350,10 @@ def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _E
         profile = sample(picture, plane.to_pixels(world))
         place, height = _step(sign * profile, reach)
         good = height > 0.06
+        if good.sum() > 3:
+            # The edges of all keys are in one line; what is not is a shelf or a shadow.
+            at, slope = line_through(along[good], place[good])
+            good &= np.abs(place - at - slope * along) < _OFF_LINE
         pixels.append(plane.to_pixels(np.stack([x + place[good], along[good]], axis=-1)))
         axis.append(np.zeros(good.sum(), int))
         value.append(np.full(good.sum(), x))

@@ -25,6 +25,9 @@ _CONTRAST = 0.12
 """Between black and white, at least, on a scale of 0 to 1."""
 _FEWEST = 5
 """Black keys on a line."""
+_NARROWEST = 5
+"""White keys [pixels]."""
+_GUESSES = 8
 _LINES = 150
 _ANGLES = np.radians(np.arange(-10, 11, 2.0))
 
@@ -133,8 +136,8 @@ def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
         return None
     kept = [fit for row in chosen if (fit := fits[row]) is not None]
     r = rows[chosen]
-    start = _line(r, np.array([fit.start for fit in kept]))
-    wide = _line(r, np.array([fit.width for fit in kept]))
+    start = line_through(r, np.array([fit.start for fit in kept]))
+    wide = line_through(r, np.array([fit.width for fit in kept]))
     numbers, times = np.unique(np.concatenate([fit.blacks for fit in kept]), return_counts=True)
     return Lines(
         origin,
@@ -148,8 +151,8 @@ def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
     )
 
 
-def _line(r: NDArray[np.float64], value: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2,) value at r = 0 and slope, from the middle halves of all pairs (Theil and Sen)."""
+def line_through(r: NDArray[np.float64], value: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2,) value at r = 0 and slope: the middle of the slopes of all pairs (Theil and Sen)."""
     first, second = np.triu_indices(len(r), 1)
     slope = np.median((value[second] - value[first]) / (r[second] - r[first]))
     return np.array([np.median(value - slope * r), slope])
@@ -189,32 +192,49 @@ def _fit(dark: NDArray[np.bool_], s: NDArray[np.float64]) -> _Fit | None:
     length = (end - begin).astype(np.float64)
     if len(centre) < _FEWEST:
         return None
-    # Two neighbours, taken as each pair of neighbouring black keys, give scale and place.
-    gaps = np.diff(np.append(_BLACK_AT, _BLACK_AT[0] + 7))
-    left = np.repeat(np.arange(len(centre) - 1), 5)
-    kind = np.tile(np.arange(5), len(centre) - 1)
-    width = (centre[left + 1] - centre[left]) / gaps[kind]
-    start = centre[left] - width * _BLACK_AT[kind]
-    ratio = length[left] / width
-    sensible = (ratio > _WIDTHS[0]) & (ratio < _WIDTHS[1]) & (width > 5)
+    # Two stretches, five black keys and so an octave apart, taken as each of five kinds, give scale
+    # and place. Where some between them are hidden, they are fewer.
+    guesses = []
+    for step in (5, 4, 3):
+        if len(centre) <= step:
+            continue
+        left = np.repeat(np.arange(len(centre) - step), 5)
+        kind = np.tile(np.arange(5), len(centre) - step)
+        width = (centre[left + step] - centre[left]) / 7
+        guesses.append((centre[left] - width * _BLACK_AT[kind], width, length[left] / width))
+    start, width, ratio = (np.concatenate(each) for each in zip(*guesses, strict=True))
+    sensible = (ratio > _WIDTHS[0]) & (ratio < _WIDTHS[1]) & (width > _NARROWEST)
     if not sensible.any():
         return None
     start, width = start[sensible], width[sensible]
     score, number, fits = _judge(centre, length, start, width)
-    best = int(np.argmax(score))
-    for _ in range(3):  # least squares on those that fit, twice over
-        chosen = fits[best]
-        if chosen.sum() < _FEWEST:
-            return None
-        place = black_place(number[best][chosen])
-        scale, at = np.polyfit(place, centre[chosen], 1)
-        if not scale > 5:
-            return None
-        score, number, fits = _judge(centre, length, np.array([at]), np.array([scale]))
-        best = 0
-    if fits[0].sum() < _FEWEST:
-        return None
-    return _Fit(float(at), float(scale), np.unique(number[0][fits[0]]), float(score[0]))
+    best: _Fit | None = None
+    for guess in np.argsort(-score)[:_GUESSES]:
+        refined = _least_squares(centre, length, number[guess], fits[guess])
+        if refined is not None and (best is None or refined.score > best.score):
+            best = refined
+    return best
+
+
+def _least_squares(
+    centre: NDArray[np.float64],
+    length: NDArray[np.float64],
+    number: NDArray[np.int64],
+    fits: NDArray[np.bool_],
+) -> _Fit | None:
+    """The line through stretches that fit, those that then fit too included, and so on."""
+    best: _Fit | None = None
+    for _ in range(3):
+        if fits.sum() < _FEWEST:
+            break
+        width, start = np.polyfit(black_place(number[fits]), centre[fits], 1)
+        if not width > _NARROWEST:
+            break
+        score, numbers, fitting = _judge(centre, length, np.array([start]), np.array([width]))
+        number, fits = numbers[0], fitting[0]
+        if fits.sum() >= _FEWEST and (best is None or score[0] > best.score):
+            best = _Fit(float(start), float(width), np.unique(number[fits]), float(score[0]))
+    return best
 
 
 def _judge(
