@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Iterator
@@ -105,6 +106,7 @@ class Film:
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
             for number in range(count):
+                goal = math.inf
                 if self.seconds:
                     goal = self._start + self.seconds * (number + 0.5) / count
                     try:
@@ -113,16 +115,18 @@ class Film:
                         continue
                 # Only key frames can be reached at once; where several goals lead to the same
                 # one, go on a little farther each time.
-                skip = 0
-                for frame in self._decode(container, stream):
-                    if skip == 0:
-                        key = frame.time or 0.0
+                skip = -1
+                latest = None
+                for latest in self._decode(container, stream):
+                    if skip < 0:
+                        key = latest.time or 0.0
                         visits[key] = visits.get(key, -1) + 1
-                        skip = 1 + _STRIDE * visits[key]
-                    skip -= 1
-                    if skip == 0:
-                        pictures.append(self._picture(0.0, frame, None).picture)
+                        skip = _STRIDE * visits[key]
+                    if skip == 0 or (latest.time or 0.0) >= goal:
                         break
+                    skip -= 1
+                if latest is not None:
+                    pictures.append(self._picture(0.0, latest, None).picture)
         return pictures
 
     def _picture(self, seconds: float, frame: Any, last: Frame | None) -> Frame:

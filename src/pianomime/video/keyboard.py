@@ -28,6 +28,8 @@ FAR, FRONT = -0.075, 0.075
 """[m] world x of the two ends of the white keys."""
 BLACK_FRONT = float(key_centres()[1, 0] + key_half_sizes()[1, 0])
 """[m] world x where the black keys end toward the player."""
+_MOST_DOUBT = 0.25
+"""Black keys, of those found, that may be missing or too many."""
 _OFF_LINE = 0.003
 """[m]"""
 LEFT_EDGE = float(key_centres()[0, 1]) - WHITE_WIDTH / 2
@@ -98,7 +100,7 @@ def find_keyboards(picture: NDArray[np.float32]) -> list[Keyboard]:
                 found.append(Keyboard(plane, seen, metres, pixels, mirrored, name.doubt))
     # A mirror only where nothing else explains what is seen: half a keyboard looks the same.
     found.sort(key=lambda way: (way.doubt + 0.5 * way.mirrored, way.error_metres))
-    if not found:
+    if not found or found[0].doubt > _MOST_DOUBT * len(lines.blacks):
         return []
     return [way for way in found if way.doubt <= found[0].doubt + 1.0]
 

@@ -192,6 +192,11 @@ def _fit(dark: NDArray[np.bool_], s: NDArray[np.float64]) -> _Fit | None:
     length = (end - begin).astype(np.float64)
     if len(centre) < _FEWEST:
         return None
+    # Lines between white keys are dark too, but thin.
+    broad = length > 0.35 * np.percentile(length, 75)
+    centre, length = centre[broad], length[broad]
+    if len(centre) < _FEWEST:
+        return None
     # Two stretches, five black keys and so an octave apart, taken as each of five kinds, give scale
     # and place. Where some between them are hidden, they are fewer.
     guesses = []
