@@ -37,6 +37,18 @@ def cores() -> list[int]:
     return sorted(os.sched_getaffinity(0))
 
 
+def shared() -> Path:
+    """The folder of reference data, which a user's machine does not have.
+
+    Raises:
+        SystemExit: there is none.
+    """
+    name = os.environ.get("PIANOMIME_SHARED")
+    if not name or not Path(name).is_dir():
+        raise SystemExit("skipped: PIANOMIME_SHARED names no folder with the reference data")
+    return Path(name)
+
+
 def machine() -> dict[str, Any]:
     """What somebody needs to know to judge a timing."""
     import mujoco

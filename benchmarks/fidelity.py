@@ -13,7 +13,6 @@ Needs the reference data (PIANOMIME_SHARED names their folder). What is measured
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -165,10 +164,7 @@ def main() -> None:
     options.add_argument("--every", type=int, default=1, help="take every so many clips")
     options.add_argument("--every-row", type=int, default=4, help="predict from so many rows")
     arguments = options.parse_args()
-    name = os.environ.get("PIANOMIME_SHARED")
-    if not name or not Path(name).is_dir():
-        common.skip("PIANOMIME_SHARED names no folder with the reference data")
-    shared = Path(name)
+    shared = common.shared()
     facts = common.machine()
     common.show_machine(facts)
     outcomes: dict[int, Outcome] = {}

@@ -58,6 +58,7 @@ def performance(
     return Performance(
         score=score,
         player="made up",
+        effort=2,
         plan=plan(score) if planned else None,
         ctrl=draw.normal(size=(frames, 46)),
         qpos=draw.normal(size=(frames, 142)),

@@ -116,7 +116,7 @@ def test_what_cannot_be_played_is_one_line(capsys: pytest.CaptureFixture[str]) -
         (["--start", "9999"], "nothing to play from 9999 s"),
         (["-o", "file"], "file: is a file"),
         (["-o", "file/below"], "file: is a file"),
-        (["-o", "/proc/pianomime/out"], "/proc"),
+        (["-o", "/proc/pianomime/out"], "/proc/pianomime/out: cannot be written"),
     ],
 )
 def test_options_that_make_no_sense_are_one_line(

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -36,7 +37,8 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    assert set(results) == {"player", "songs", "mean"}
+    assert set(results) == {"player", "effort", "seconds", "songs", "mean", "causes"}
+    assert results["seconds"] == 1.0
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())
     broken = rows.pop("broken|one")
@@ -44,11 +46,21 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     assert len(rows) == 5
     mean = sum(row["f1"] for row in rows.values()) / 5
     assert results["mean"]["f1"] == pytest.approx(mean, abs=1e-6)
-    assert sorted(step[:2] for step in told) == [(n, 6) for n in range(1, 7)]
+    assert {row["effort"] for row in rows.values()} == {results["effort"]}
+    assert "effort" not in results["mean"]
+    assert [step[:2] for step in told] == [(n, 6) for n in range(7)]
     assert told[-1][2] == pytest.approx(mean)
 
-    table = (out / "results.md").read_text(encoding="utf-8").splitlines()
+    for kind in ("missed", "wrong"):
+        lost = sum(sum(row["causes"][kind].values()) for row in rows.values())
+        wanted = sum(row["causes"]["wanted"] for row in rows.values())
+        assert sum(results["causes"][kind].values()) == pytest.approx(lost / wanted, abs=1e-4)
+    assert "causes" not in results["mean"]
+
+    tables = (out / "results.md").read_text(encoding="utf-8").split("\n\n")
+    table, causes = (text.splitlines() for text in tables)
     assert len(table) == 2 + 6 + 1
+    assert len(causes) == 2 + sum(len(shares) for shares in results["causes"].values())
     # Every line has as many cells as the first, the bar in the broken one's name escaped.
     assert len({line.replace("\\|", "").count("|") for line in table}) == 1
 
@@ -98,7 +110,7 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
 
 def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
-    with SongWorker("zero-shot", 1.0) as worker:
+    with SongWorker("zero-shot", 0, 1.0) as worker:
         assert "f1" in worker.play(song)
         os.kill(worker.pid, signal.SIGKILL)
         crashed = worker.play(song)
@@ -106,10 +118,47 @@ def test_a_crash_costs_one_song(folder: Path) -> None:
         assert "f1" in worker.play(song)
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
+def test_no_process_outlives_a_run_that_stops(
+    error: type[BaseException], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[subprocess.Popen[str]] = []
+    start = SongWorker._start
+
+    def note(worker: SongWorker) -> subprocess.Popen[str]:
+        started.append(start(worker))
+        return started[-1]
+
+    def stop(done: int, total: int, f1: float) -> None:
+        if done:
+            raise error
+
+    monkeypatch.setattr(SongWorker, "_start", note)
+    before = set(threading.enumerate())
+    with pytest.raises(error):
+        evaluate(folder, seconds=1.0, jobs=2, effort=0, progress=stop)
+    for thread in set(threading.enumerate()) - before:
+        thread.join(timeout=10)
+    assert len(started) == 2
+    assert all(process.poll() is not None for process in started)
+
+
+def test_a_worker_does_not_wait_for_what_only_reports_need() -> None:
+    script = (
+        "import sys, pianomime.song_worker\n"
+        "print([name for name in ('matplotlib', 'av', 'rich') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[]\n"
+
+
 def test_when_all_fail_there_is_no_mean(tmp_path: Path) -> None:
     (tmp_path / "broken.mid").write_text("this is no music")
     results = evaluate(tmp_path, jobs=1)
     assert results["mean"] == {}
+    assert results["causes"] == {"missed": {}, "wrong": {}}
     assert "failed" in markdown(results)
     assert list(tmp_path.iterdir()) == [tmp_path / "broken.mid"]
 
@@ -124,9 +173,22 @@ def test_folders_are_searched_and_nothing_is_found_twice(folder: Path) -> None:
     assert deep / "UPPER.MIDI" in found
 
 
-def test_progress_has_no_mean_before_the_first_song(tmp_path: Path) -> None:
-    (tmp_path / "broken.mid").write_text("this is no music")
-    told: list[float] = []
-    evaluate(tmp_path, jobs=1, progress=lambda done, total, f1: told.append(f1))
-    assert len(told) == 1
-    assert math.isnan(told[0])
+def test_progress_is_told_before_any_process_works_and_has_no_mean_before_the_first_song(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "1.mid").write_text("this is no music")
+    (tmp_path / "2.mid").write_bytes(songs.path(songs.names()[0]).read_bytes())
+    told: list[tuple[int, int, float]] = []
+    start = SongWorker._start
+
+    def note(worker: SongWorker) -> subprocess.Popen[str]:
+        assert told == [(0, 2, pytest.approx(math.nan, nan_ok=True))]
+        return start(worker)
+
+    monkeypatch.setattr(SongWorker, "_start", note)
+    results = evaluate(
+        tmp_path, seconds=1.0, jobs=1, effort=0, progress=lambda *step: told.append(step)
+    )
+    assert [step[:2] for step in told] == [(0, 2), (1, 2), (2, 2)]
+    assert math.isnan(told[1][2])
+    assert told[2][2] == pytest.approx(results["mean"]["f1"], abs=1e-6)

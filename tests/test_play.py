@@ -81,6 +81,7 @@ def test_a_player_asks_for_every_frame_once_and_records_what_happened() -> None:
     assert one.asked == list(range(frames))
     assert len(performance) == frames
     assert performance.player == "one finger"
+    assert performance.effort == 0
     assert performance.dropped_notes == len(score)
     np.testing.assert_array_equal(performance.pedal, score.pedal_roll())
     assert told[0] == ("planning", 0, 0)

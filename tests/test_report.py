@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import io
 import json
 import os
@@ -15,11 +16,13 @@ import made_up
 from pianomime import Performance
 from pianomime.errors import InputError
 from pianomime.music import Score
-from pianomime.report import DARK, FILES, draw, numbers, staged, write_report
+from pianomime.numbers import numbers
+from pianomime.report import DARK, FILES, draw, staged, write_report
 from pianomime.report.mp3 import mp3
+from pianomime.world.render import RenderUnavailable
 
 PROTOCOL = (
-    "song", "player", "song_seconds", "frames", "precision", "recall", "f1", "onset_f1",
+    "song", "player", "effort", "song_seconds", "frames", "precision", "recall", "f1", "onset_f1",
     "pedal_f1", "plan_seconds", "simulate_seconds", "realtime_factor",
 )  # fmt: skip
 
@@ -31,6 +34,7 @@ def test_numbers_hold_what_was_agreed() -> None:
     assert row["frames"] == len(score.roll())
     assert row["dropped_notes"] == 1
     assert row["blow_ups"] == 1
+    assert row["effort"] == 2
     assert row["realtime_factor"] == pytest.approx(row["song_seconds"] / 0.75, abs=1e-3)
 
 
@@ -61,6 +65,7 @@ def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) ->
 
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "&lt;b&gt;Bach &amp; Söhne" in html
+    assert "effort 2" in html
     sources = Page(html).sources
     assert len(sources) == 4
     assert all(source.startswith("data:") for source in sources)
@@ -75,12 +80,10 @@ def test_silence_can_be_reported(tmp_path: Path) -> None:
 def test_without_opengl_one_line_says_so_and_the_rest_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pianomime.world import render
-
     def nothing(*_: object, **__: object) -> None:
-        raise render.RenderUnavailable("no film: install OpenGL")
+        raise RenderUnavailable("no film: install OpenGL")
 
-    monkeypatch.setattr(render, "write_video", nothing)
+    monkeypatch.setattr("pianomime.report.write.write_video", nothing)
     notes: list[str] = []
     write_report(
         made_up.performance(made_up.score(notes=3)), tmp_path, True, lambda *_: None, notes.append
@@ -131,6 +134,43 @@ def test_staging_replaces_what_is_ours_and_nothing_else(tmp_path: Path) -> None:
         "a": "new",
         "theirs": "old",
     }
+
+
+def test_a_new_folder_has_the_permissions_of_any_other(tmp_path: Path) -> None:
+    with staged(tmp_path / "out", []):
+        pass
+    (tmp_path / "other").mkdir()
+    assert (tmp_path / "out").stat().st_mode == (tmp_path / "other").stat().st_mode
+
+
+def test_the_folder_of_another_run_is_left_alone(tmp_path: Path) -> None:
+    other = tmp_path / f".pianomime-{os.getpid()}"
+    other.mkdir()
+    (other / "a").write_text("theirs")
+    with staged(tmp_path / "out", ["a"]) as folder:
+        (folder / "a").write_text("ours")
+    assert (other / "a").read_text() == "theirs"
+    assert (tmp_path / "out" / "a").read_text() == "ours"
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(tmp_path / "temporary"))
+
+    for module, function in (("tempfile", "mkdtemp"), ("os", "replace")):
+        out.mkdir(exist_ok=True)
+        with monkeypatch.context() as patch:
+            patch.setattr(f"{module}.{function}", refuse)
+            with (
+                pytest.raises(InputError, match=rf"^{out}: cannot be written: Permission denied$"),
+                staged(out, []) as folder,
+            ):
+                (folder / "a").write_text("new")
+        assert list(out.iterdir()) == []
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])

@@ -47,6 +47,7 @@ COMMANDS = {
     "import-demos": Command(
         "pianomime.commands.import_demos", "ImportDemos", "read the paper's demonstrations"
     ),
+    "explain": Command("pianomime.commands.explain", "Explain", "say why notes went wrong"),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }
 
@@ -61,6 +62,7 @@ def _help() -> str:
         "  pianomime play ode-to-joy\n"
         "  pianomime play SONG.mid -o out/song --seconds 60\n"
         "  pianomime evaluate FOLDER -o out/all --jobs 2\n"
+        "  pianomime explain out/song/performance.npz\n"
     )
 
 

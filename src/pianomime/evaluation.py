@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import queue
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.files import atomic
-from pianomime.play import SECONDS, Player
+from pianomime.play import EFFORT, SECONDS, check_player
 from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
 
 Row = dict[str, Any]
-"""The numbers of one song (see `pianomime.report.numbers`), or `song` and `error`."""
+"""The numbers of one song (see `pianomime.numbers`) and its `causes` (see
+`pianomime.explain.frames_by_cause`, if the player plans), or `song` and `error`."""
+
+# Those that decide how a song is played.
+_LIBRARIES = ("daqp", "mujoco", "numpy", "scipy", "symusic")
 
 Progress = Callable[[int, int, float], None]
 """Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
@@ -31,6 +39,7 @@ def evaluate(
     jobs: int | None = None,
     out: str | Path | None = None,
     progress: Progress | None = None,
+    effort: int = EFFORT,
 ) -> dict[str, Any]:
     """Play and score songs, several at a time, each in a process of its own.
 
@@ -45,30 +54,34 @@ def evaluate(
         jobs: processes; one a core if None.
         out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
         progress: told how far it is.
+        effort: how hard the player tries, 0 to 3.
 
     Returns:
-        What `results.json` holds: `player`, `songs` (a row each, in the order of `paths`) and
-        `mean` (of every number, over the songs that did not fail; empty if all did).
+        What `results.json` holds: `player`, `effort` and `seconds` as asked for (None: whole
+        songs), `songs` (a row each, in the order of `paths`), `mean` (of what was measured, over the
+        songs that did not fail; empty if all did) and `causes` (`missed` and `wrong`: the share
+        of the key-frames wanted in all songs that each cause cost, the costliest first).
 
     Raises:
         InputError: a path stands for no song, or there is no such player.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
-    Player.from_name(player)
+    check_player(player, effort)
     if not seconds > 0:
         raise InputError(f"seconds must be more than 0, not {seconds:g}")
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
-    store = None if out is None else _Store(Path(out), f"{player} {seconds:g}")
+    store = None if out is None else _Store(Path(out), f"{player} {effort} {seconds:g}")
 
     rows: dict[Path, Row] = {}
 
-    def finish(song: Path, row: Row) -> None:
-        rows[song] = row
+    def tell() -> None:
         if progress is not None:
             f1 = [row["f1"] for row in rows.values() if "error" not in row]
-            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else float("nan"))
+            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else math.nan)
+
+    tell()
 
     waiting = []
     for song in songs:
@@ -76,16 +89,22 @@ def evaluate(
         if known is None:
             waiting.append(song)
         else:
-            finish(song, known)
-    for song, row in _play_all(waiting, player, seconds, jobs or os.cpu_count() or 1):
-        if store is not None and "error" not in row:
-            store.put(song, row)
-        finish(song, row)
+            rows[song] = known
+            tell()
+    with closing(_play_all(waiting, player, effort, seconds, jobs or _cores())) as played:
+        for song, row in played:
+            if store is not None and "error" not in row:
+                store.put(song, row)
+            rows[song] = row
+            tell()
 
     results = {
         "player": player,
+        "effort": effort,
+        "seconds": seconds if math.isfinite(seconds) else None,
         "songs": [rows[song] for song in songs],
         "mean": _mean(list(rows.values())),
+        "causes": _causes(list(rows.values())),
     }
     if store is not None:
         store.close(results)
@@ -93,7 +112,7 @@ def evaluate(
 
 
 def markdown(results: dict[str, Any]) -> str:
-    """The results as a Markdown table, a line a song and one of the means.
+    """The results as Markdown: a table of songs and their means, and one of causes.
 
     Args:
         results: what `evaluate` returns.
@@ -120,6 +139,16 @@ def markdown(results: dict[str, Any]) -> str:
     if mean:
         whole = f"{mean['dropped_notes']:.1f}/{mean['notes']:.1f} | {mean['blow_ups']:.1f}"
         lines.append(f"| **mean** | {' | '.join(cells(mean))} | {whole} |")
+    causes = [
+        (share, kind, cause)
+        for kind, shares in results["causes"].items()
+        for cause, share in shares.items()
+    ]
+    if causes:
+        lines += ["", "| cause | | of the key-frames wanted |", "| --- | --- | ---: |"]
+        lines += [
+            f"| {cause} | {kind} | {share:.2%} |" for share, kind, cause in sorted(causes)[::-1]
+        ]
     return "\n".join(lines) + "\n"
 
 
@@ -128,8 +157,22 @@ def _mean(rows: list[Row]) -> dict[str, float]:
     good = [row for row in rows if "error" not in row]
     if not good:
         return {}
-    names = [name for name, value in good[0].items() if not isinstance(value, str)]
+    names = [name for name, value in good[0].items() if isinstance(value, int | float)]
+    names.remove("effort")
     return {name: round(sum(row[name] for row in good) / len(good), 6) for name in names}
+
+
+def _causes(rows: list[Row]) -> dict[str, dict[str, float]]:
+    """Share of the key-frames wanted that each cause cost, over all songs together."""
+    known = [row["causes"] for row in rows if "causes" in row]
+    wanted = max(sum(causes["wanted"] for causes in known), 1)
+    shares = {}
+    for kind in ("missed", "wrong"):
+        frames: Counter[str] = Counter()
+        for causes in known:
+            frames.update(causes[kind])
+        shares[kind] = {cause: round(count / wanted, 6) for cause, count in frames.most_common()}
+    return shares
 
 
 class _Store:
@@ -173,22 +216,31 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _program_hash() -> str:
-    """Changes with our code and figures, so that results of another program are not reused."""
+    """Changes with our code, its figures and its libraries, so that no older result is reused."""
     digest = hashlib.sha256()
+    for library in _LIBRARIES:
+        digest.update(f"{library} {version(library)} ".encode())
     for file in sorted(Path(__file__).parent.rglob("*")):
         if file.suffix in (".py", ".json"):
             digest.update(file.read_bytes())
     return digest.hexdigest()
 
 
+def _cores() -> int:
+    """The cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):  # Linux; a container often allows fewer than there are.
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def _play_all(
-    songs: list[Path], player: str, seconds: float, jobs: int
-) -> Iterator[tuple[Path, Row]]:
+    songs: list[Path], player: str, effort: int, seconds: float, jobs: int
+) -> Generator[tuple[Path, Row], None, None]:
     """Songs with their rows, in the order in which they finish."""
     if not songs:
         return
     idle: queue.SimpleQueue[SongWorker] = queue.SimpleQueue()
-    workers = [SongWorker(player, seconds) for _ in range(min(jobs, len(songs)))]
+    workers = [SongWorker(player, effort, seconds) for _ in range(min(jobs, len(songs)))]
     for worker in workers:
         idle.put(worker)
 

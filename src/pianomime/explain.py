@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +16,18 @@ from pianomime.plan import NO_KEY
 from pianomime.world.figures import key_centres, key_half_sizes
 from pianomime.world.hand import SIDES, Hand
 
-_NOBODY = -1
+NOBODY = -1
+"""Stands for no hand, no finger or no note."""
+
 # A finger this much further from a key's middle than the key's edge still presses it [m].
 _OVERLAP = 0.003
 # A key less than this share of the way down has not been touched.
 _TOUCHED = 0.05
+# A fingertip whose site is further than this from a key's box at rest does not press it [m]: its
+# flesh is 8.5 mm thick below the site and at most 12 mm around it.
+_TOUCH = 0.013
+# A key that goes down longer before its note than this was not meant for it [frames].
+_MOST_EARLY = 4
 # Frames after the physics broke that are put down to it: the hands take so long to come back.
 _AFTERMATH = 10
 
@@ -33,11 +42,12 @@ class Cause(StrEnum):
     ABOVE = "finger above its key"
     LATE = "pressed late"
     SHALLOW = "pressed too shallow"
+    PLANNED_WRONG = "planned, not wanted"
     EARLY = "pressed early"
     RELEASED_LATE = "released late"
-    NEIGHBOUR = "neighbour hit by a pressing finger"
+    NEIGHBOUR = "hit by a pressing finger"
     IDLE = "hit by an idle finger"
-    UNKNOWN = "hit by something else"
+    NO_TIP = "down without a fingertip"
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,7 @@ class Fault:
         cause: why.
         hand, finger: 0 left or 1 right, and 0 thumb .. 4 little, of the finger to blame; -1 for
             none.
+        note: the note of the score that was missed; -1 for a wrong key.
     """
 
     missed: bool
@@ -60,10 +71,50 @@ class Fault:
     cause: Cause
     hand: int
     finger: int
+    note: int
 
 
-def explain(performance: Performance) -> list[Fault]:
-    """Every fault of a performance, in order of time.
+@dataclass(frozen=True)
+class Explanation:
+    """Everything that went wrong in one performance.
+
+    Attributes:
+        song: title of the score.
+        player: who played.
+        wanted: key-frames that the score asks for: cells of its roll.
+        faults: in order of time; their frames add up to the cells that were missed and wrong.
+    """
+
+    song: str
+    player: str
+    wanted: int
+    faults: list[Fault]
+
+
+@dataclass(frozen=True)
+class Total:
+    """What one cause cost.
+
+    Attributes:
+        missed: whether keys were up that should have been down, or the other way round.
+        cause: why.
+        frames: key-frames lost.
+        share: of the key-frames wanted.
+        notes: notes of the score that were missed in part or whole, or wrong presses.
+        hand, finger: who is to blame for most of it, as in Fault.
+    """
+
+    missed: bool
+    cause: Cause
+    frames: int
+    share: float
+    notes: int
+    hand: int
+    finger: int
+
+
+def explain(performance: Performance) -> Explanation:
+    """Find the cause of every fault of a performance.
 
     Args:
         performance: one with a fingertip plan.
@@ -71,40 +122,63 @@ def explain(performance: Performance) -> list[Fault]:
     Raises:
         ValueError: the performance has no plan to compare with.
     """
-    if performance.plan is None:
-        raise ValueError("a performance without a fingertip plan cannot be explained")
     scene = _Scene.of(performance)
     faults = []
-    for missed, cells in (
-        (True, scene.wanted & ~performance.pressed),
-        (False, performance.pressed & ~scene.wanted),
+    for missed, cells, judge in (
+        (True, scene.wanted & ~scene.pressed, scene.why_missed),
+        (False, scene.pressed & ~scene.wanted, scene.why_wrong),
     ):
-        judge = scene.why_missed if missed else scene.why_wrong
-        for key in np.flatnonzero(cells.any(axis=0)):
-            run: Fault | None = None
-            for frame in np.flatnonzero(cells[:, key]):
-                cause, hand, finger = judge(int(frame), int(key))
-                same = (
-                    run is not None
-                    and run.first + run.frames == frame
-                    and (run.cause, run.hand, run.finger) == (cause, hand, finger)
-                )
-                if run is not None and same:
-                    run = Fault(missed, run.key, run.first, run.frames + 1, cause, hand, finger)
-                    faults[-1] = run
-                else:
-                    run = Fault(missed, int(key), int(frame), 1, cause, hand, finger)
-                    faults.append(run)
-    return sorted(faults, key=lambda fault: (fault.first, fault.key))
+        for key in np.flatnonzero(cells.any(axis=0)).tolist():
+            judged = [
+                (frame, (*judge(frame, key), int(scene.note[frame, key])))
+                for frame in np.flatnonzero(cells[:, key]).tolist()
+            ]
+            # In an unbroken run, the frame less its place in the list stays the same.
+            places = groupby(enumerate(judged), lambda item: (item[1][0] - item[0], item[1][1]))
+            for (_, (cause, hand, finger, note)), group in places:
+                frames = [frame for _, (frame, _) in group]
+                faults.append(Fault(missed, key, frames[0], len(frames), cause, hand, finger, note))
+    faults.sort(key=lambda fault: (fault.first, fault.key))
+    wanted = int(scene.wanted.sum())
+    return Explanation(performance.score.title, performance.player, wanted, faults)
 
 
-def frames_by_cause(faults: list[Fault], missed: bool) -> dict[Cause, int]:
-    """Key-frames lost to each cause, the costliest first."""
-    count: Counter[Cause] = Counter()
-    for fault in faults:
-        if fault.missed == missed:
-            count[fault.cause] += fault.frames
-    return dict(count.most_common())
+def totals(explanations: Iterable[Explanation]) -> list[Total]:
+    """What each cause cost over all performances together, the costliest first."""
+    frames: Counter[tuple[bool, Cause]] = Counter()
+    fingers: dict[tuple[bool, Cause], Counter[tuple[int, int]]] = {}
+    notes: dict[tuple[bool, Cause], set[tuple[int, int, int]]] = {}
+    wanted = 0
+    for song, explanation in enumerate(explanations):
+        wanted += explanation.wanted
+        for place, fault in enumerate(explanation.faults):
+            kind = fault.missed, fault.cause
+            frames[kind] += fault.frames
+            fingers.setdefault(kind, Counter())[fault.hand, fault.finger] += fault.frames
+            # A missed note counts once, however often it was lost; a wrong press is its own.
+            note = (fault.note, NOBODY) if fault.missed else (NOBODY, place)
+            notes.setdefault(kind, set()).add((song, *note))
+    return [
+        Total(
+            *kind,
+            frames=count,
+            share=count / max(wanted, 1),
+            notes=len(notes[kind]),
+            hand=fingers[kind].most_common(1)[0][0][0],
+            finger=fingers[kind].most_common(1)[0][0][1],
+        )
+        for kind, count in frames.most_common()
+    ]
+
+
+def frames_by_cause(explanation: Explanation) -> dict[str, int | dict[str, int]]:
+    """The key-frames `wanted`, and those `missed` and `wrong` by cause, the costliest first."""
+    sums = totals([explanation])
+    return {
+        "wanted": explanation.wanted,
+        "missed": {total.cause.value: total.frames for total in sums if total.missed},
+        "wrong": {total.cause.value: total.frames for total in sums if not total.missed},
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +189,7 @@ class _Scene:
         wanted: (T, 88) bool.
         pressed: (T, 88) bool.
         key_state: (T, 88) 0..1.
+        note: (T, 88) the note of the score that wants a key, -1 for none.
         finger_key: (T, 2, 5) the key each finger was to press.
         planned: (T, 2, 5) [m] where along the keyboard each fingertip was to be.
         tips: (T, 2, 5, 3) [m] where the fingertips were at the end of each frame.
@@ -124,6 +199,7 @@ class _Scene:
     wanted: NDArray[np.bool_]
     pressed: NDArray[np.bool_]
     key_state: NDArray[np.float64]
+    note: NDArray[np.int64]
     finger_key: NDArray[np.int8]
     planned: NDArray[np.float64]
     tips: NDArray[np.float64]
@@ -131,8 +207,9 @@ class _Scene:
 
     @classmethod
     def of(cls, performance: Performance) -> _Scene:
-        plan = performance.plan
-        assert plan is not None
+        plan, score = performance.plan, performance.score
+        if plan is None:
+            raise ValueError("a performance without a fingertip plan cannot be explained")
         tips = np.empty((len(performance), 2, 5, 3))
         for index, side in enumerate(SIDES):
             hand = Hand(side)
@@ -141,62 +218,85 @@ class _Scene:
         broken = np.zeros(len(performance), bool)
         for frame in performance.blow_ups:
             broken[frame : frame + _AFTERMATH] = True
+        note = np.full(performance.pressed.shape, NOBODY)
+        for index, (first, stop) in enumerate(score.note_frames()):
+            note[first:stop, score.key[index]] = index
         return cls(
-            performance.score.roll(),
-            performance.pressed,
-            performance.key_state,
-            plan.finger_key,
-            plan.fingertips[:, :, 1:, 1],
-            tips,
-            broken,
+            wanted=score.roll(),
+            pressed=performance.pressed,
+            key_state=performance.key_state,
+            note=note,
+            finger_key=plan.finger_key,
+            planned=plan.fingertips[:, :, 1:, 1],
+            tips=tips,
+            broken=broken,
         )
 
     def why_missed(self, frame: int, key: int) -> tuple[Cause, int, int]:
         """Cause, hand and finger for a key that should have been down."""
-        fingers = np.argwhere(self.finger_key[frame] == key)
+        fingers = np.argwhere(self.finger_key[frame] == key).tolist()
+        # What was not planned would have been missed by sound physics too.
+        if not fingers:
+            return Cause.NOT_PLANNED, NOBODY, NOBODY
         if self.broken[frame]:
-            return Cause.BROKEN, _NOBODY, _NOBODY
-        if not len(fingers):
-            return Cause.NOT_PLANNED, _NOBODY, _NOBODY
-        hand, finger = (int(index) for index in fingers[0])
+            return Cause.BROKEN, NOBODY, NOBODY
+        hand, finger = fingers[0]
         edge = key_half_sizes()[key, 1] + _OVERLAP
         along = key_centres()[key, 1]
         if abs(self.planned[frame, hand, finger] - along) > edge:
             return Cause.PLANNED_ASIDE, hand, finger
         if abs(self.tips[frame, hand, finger, 1] - along) > edge:
             return Cause.BESIDE, hand, finger
-        if self.key_state[frame, key] < _TOUCHED:
-            return Cause.ABOVE, hand, finger
-        begins = frame == 0 or self.finger_key[frame - 1, hand, finger] != key
-        return (Cause.LATE if begins else Cause.SHALLOW), hand, finger
+        if self._is_late(frame, key, hand, finger):
+            return Cause.LATE, hand, finger
+        above = self.key_state[frame, key] < _TOUCHED
+        return (Cause.ABOVE if above else Cause.SHALLOW), hand, finger
+
+    def _is_late(self, frame: int, key: int, hand: int, finger: int) -> bool:
+        """Whether the key goes down later in this press, or just after it, but not before."""
+        at_it = self.finger_key[:, hand, finger] == key
+        first = last = frame
+        while first > 0 and at_it[first - 1]:
+            first -= 1
+        while last + 1 < len(at_it) and at_it[last + 1]:
+            last += 1
+        before, after = self.pressed[first:frame, key], self.pressed[frame + 1 : last + 2, key]
+        return bool(after.any() and not before.any())
 
     def why_wrong(self, frame: int, key: int) -> tuple[Cause, int, int]:
         """Cause, hand and finger for a key that should have been up."""
         if self.broken[frame]:
-            return Cause.BROKEN, _NOBODY, _NOBODY
+            return Cause.BROKEN, NOBODY, NOBODY
+        fingers = np.argwhere(self.finger_key[frame] == key).tolist()
+        if fingers:
+            hand, finger = fingers[0]
+            return Cause.PLANNED_WRONG, hand, finger
         hand, finger = self._nearest(frame, key)
-        if self._held_on(frame, key):
+        if hand == NOBODY:
+            return Cause.NO_TIP, hand, finger
+        if self._down_since_wanted(frame, key):
             return Cause.RELEASED_LATE, hand, finger
-        if frame + 1 < len(self.wanted) and self.wanted[frame + 1, key]:
+        if self._down_until_wanted(frame, key):
             return Cause.EARLY, hand, finger
-        if hand == _NOBODY:
-            return Cause.UNKNOWN, hand, finger
         idle = self.finger_key[frame, hand, finger] == NO_KEY
         return (Cause.IDLE if idle else Cause.NEIGHBOUR), hand, finger
 
-    def _held_on(self, frame: int, key: int) -> bool:
+    def _down_since_wanted(self, frame: int, key: int) -> bool:
         """Whether the key has been down without a break since it was wanted."""
         while frame > 0 and self.pressed[frame, key] and not self.wanted[frame, key]:
             frame -= 1
         return bool(self.pressed[frame, key] and self.wanted[frame, key])
 
+    def _down_until_wanted(self, frame: int, key: int) -> bool:
+        """Whether the key soon is wanted, and stays down until then."""
+        soon = self.wanted[frame + 1 : frame + 1 + _MOST_EARLY, key]
+        return bool(soon.any() and self.pressed[frame : frame + 2 + soon.argmax(), key].all())
+
     def _nearest(self, frame: int, key: int) -> tuple[int, int]:
-        """The fingertip over a key, or touching it from the side; -1, -1 for none."""
-        tips = self.tips[frame]
-        beside = np.abs(tips[..., 1] - key_centres()[key, 1])
-        ahead = np.abs(tips[..., 0] - key_centres()[key, 0]) - key_half_sizes()[key, 0]
-        reaches = (beside < key_half_sizes()[key, 1] + 0.012) & (ahead < 0.02)
-        if not reaches.any():
-            return _NOBODY, _NOBODY
-        hand, finger = np.unravel_index(np.argmin(np.where(reaches, beside, np.inf)), beside.shape)
+        """The fingertip that presses a key, or touches it from the side; -1, -1 for none."""
+        outside = np.abs(self.tips[frame] - key_centres()[key]) - key_half_sizes()[key]
+        distance = np.linalg.norm(np.maximum(outside, 0.0), axis=-1)
+        if distance.min() > _TOUCH:
+            return NOBODY, NOBODY
+        hand, finger = np.unravel_index(np.argmin(distance), distance.shape)
         return int(hand), int(finger)

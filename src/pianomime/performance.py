@@ -24,7 +24,7 @@ FRAMES_A_SECOND = 20.0
 _VELOCITY = 64
 """Of notes that nobody asked for."""
 
-_VERSION = 1
+_VERSION = 2
 _SCORE = ("key", "onset", "offset", "velocity", "pedal")
 _PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
 _FRAMES = ("ctrl", "qpos", "key_state", "pressed", "pedal", "blow_ups")
@@ -37,6 +37,7 @@ class Performance:
     Attributes:
         score: what was to be played.
         player: name of the player.
+        effort: how hard the player tried, 0 to 3.
         plan: the fingertip plan, None for players that have none.
         ctrl: (T, 46) controls, RIGHT 23 then LEFT 23 [rad, m].
         qpos: (T, 142) all joint positions after each frame: 88 keys, RIGHT 27, LEFT 27 [rad, m].
@@ -49,6 +50,7 @@ class Performance:
 
     score: Score
     player: str
+    effort: int
     plan: FingertipPlan | None
     ctrl: NDArray[np.float64]
     qpos: NDArray[np.float64]
@@ -125,6 +127,7 @@ class Performance:
         arrays: dict[str, NDArray[np.generic]] = {
             "version": np.array(_VERSION),
             "player": np.array(self.player),
+            "effort": np.array(self.effort),
             "score_title": np.array(self.score.title),
         }
         for name in _SCORE:
@@ -154,7 +157,8 @@ class Performance:
             version = int(arrays["version"])
             if version != _VERSION:
                 raise InputError(
-                    f"{path}: a performance of version {version}; this program reads {_VERSION}"
+                    f"{path}: a performance of version {version}; this program reads {_VERSION}: "
+                    "play the song again"
                 )
             score = Score(
                 **{name: arrays[f"score_{name}"] for name in _SCORE},
@@ -166,6 +170,7 @@ class Performance:
             return cls(
                 score=score,
                 player=str(arrays["player"]),
+                effort=int(arrays["effort"]),
                 plan=plan,
                 **{name: arrays[name] for name in _FRAMES},
                 plan_seconds=float(arrays["plan_seconds"]),

@@ -12,27 +12,36 @@ import numpy as np
 from pianomime.errors import InputError
 from pianomime.music import Score
 from pianomime.performance import Performance
-from pianomime.plan import Planner
-from pianomime.track.tracker import Tracker
+from pianomime.plan import Planner, ZeroShotPlanner
+from pianomime.track import (
+    DynamicTracker,
+    IkTracker,
+    RolloutConfig,
+    RolloutTracker,
+    Tracker,
+)
 from pianomime.video.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.world import World
 
 Progress = Callable[[str, int, int], None]
 """Called with a stage ("planning", "playing"), the steps done and the steps in all (0: unknown)."""
 
+EFFORT = 1
+"""How hard players try unless told otherwise, 0 to 3."""
+
 SECONDS = 30.0
 """Length of an excerpt unless told otherwise: the longest clip of the paper's protocol."""
 
 
 def excerpt(score: Score, start: float = 0.0, seconds: float = SECONDS) -> Score:
-    """The part of a score that is played: from the first sound at or after `start`.
+    """The part of a score that is played, from what sounds at `start` or first after it.
 
     Leading silence is left out, as in the paper's protocol, so that it neither costs time nor
     counts as perfect playing.
 
     Args:
         score: the whole song.
-        start: where to begin looking for the first note [s].
+        start: where to begin [s]; a note that began before and still sounds is part of it.
         seconds: length of the excerpt at most [s]; may be infinite.
 
     Raises:
@@ -49,6 +58,24 @@ def excerpt(score: Score, start: float = 0.0, seconds: float = SECONDS) -> Score
     return score.clip(start, math.inf).trim_silence().clip(0.0, seconds)
 
 
+def check_player(name: str, effort: int) -> None:
+    """Refuse what `Player.from_name` would, without making a player.
+
+    Args:
+        name: one of `PLAYERS`.
+        effort: 0 to 3.
+
+    Raises:
+        InputError: there is no such player, or no such effort; the message lists those there are.
+    """
+    if effort not in range(4):
+        raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
+    if name in DEMONSTRATION_PLAYERS:
+        raise InputError(f"the player {name!r} plays demonstrations (.npz), not MIDI files")
+    if name not in PLAYERS:
+        raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
+
+
 @dataclass(frozen=True)
 class Player:
     """Plays scores: the planner decides where the fingertips go, the tracker gets them there.
@@ -57,44 +84,54 @@ class Player:
         name: what reports call it.
         planner: makes a FingertipPlan of a Score.
         tracker: makes controls of the plan and the state of the World.
+        effort: how hard it tries, 0 to 3; 0 for one that does not search.
     """
 
     name: str
     planner: Planner
     tracker: Tracker
+    effort: int = 0
 
     @classmethod
-    def from_name(cls, name: str) -> Player:
+    def from_name(cls, name: str, effort: int = EFFORT) -> Player:
         """A player that the house knows.
 
         Args:
             name: one of `PLAYERS`.
+            effort: 0 plays straight away; 1 to 3 try variations of what goes wrong before it
+                is played, ever more of them. Players that do not search are always the same.
 
         Raises:
-            InputError: there is no such player; the message lists those there are.
+            InputError: there is no such player, or no such effort; the message lists those
+                there are.
         """
-        if name in DEMONSTRATION_PLAYERS:
-            raise InputError(f"the player {name!r} plays demonstrations (.npz), not MIDI files")
-        if name not in PLAYERS:
-            raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
-        return PLAYERS[name]()
+        check_player(name, effort)
+        return PLAYERS[name](effort)
 
     @classmethod
-    def from_demonstration(cls, demonstration: Demonstration, name: str = "") -> Player:
+    def from_demonstration(
+        cls, demonstration: Demonstration, name: str = "", effort: int = EFFORT
+    ) -> Player:
         """A player that plays one score with the fingertips of the human who demonstrated it.
 
         Args:
             demonstration: whose score it plays.
             name: one of `DEMONSTRATION_PLAYERS`; the first if not given.
+            effort: 0 to 3, see `from_name`.
 
         Raises:
-            InputError: there is no such player; the message lists those there are.
+            InputError: there is no such player, or no such effort; the message lists those
+                there are.
         """
+        if effort not in range(4):
+            raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
         name = name or next(iter(DEMONSTRATION_PLAYERS))
         if name not in DEMONSTRATION_PLAYERS:
             there = ", ".join([*DEMONSTRATION_PLAYERS, *PLAYERS])
             raise InputError(f"there is no player {name!r} of demonstrations; there are: {there}")
-        return cls(name, DemonstrationPlanner(demonstration), DEMONSTRATION_PLAYERS[name]())
+        tracker = DEMONSTRATION_PLAYERS[name](effort)
+        tries = effort if isinstance(tracker, RolloutTracker) else 0
+        return cls(name, DemonstrationPlanner(demonstration), tracker, tries)
 
     def play(self, score: Score, progress: Progress | None = None) -> Performance:
         """Perform a score from the rest pose; the same score gives the same performance.
@@ -130,6 +167,7 @@ class Player:
         return Performance(
             score=score,
             player=self.name,
+            effort=self.effort,
             plan=plan,
             ctrl=ctrl,
             qpos=qpos,
@@ -142,41 +180,36 @@ class Player:
         )
 
 
-def _zero_shot() -> Player:
-    from pianomime.plan import ZeroShotPlanner
-    from pianomime.track import DynamicTracker
-
-    return Player("zero-shot", ZeroShotPlanner(), DynamicTracker())
+def _zero_shot(effort: int) -> Player:
+    return Player("zero-shot", ZeroShotPlanner(), _searching(effort), effort)
 
 
-def _zero_shot_ik() -> Player:
-    from pianomime.plan import ZeroShotPlanner
-    from pianomime.track import IkTracker
-
+def _zero_shot_ik(_: int) -> Player:
     return Player("zero-shot-ik", ZeroShotPlanner(), IkTracker())
 
 
-PLAYERS: dict[str, Callable[[], Player]] = {
+PLAYERS: dict[str, Callable[[int], Player]] = {
     "zero-shot": _zero_shot,
     "zero-shot-ik": _zero_shot_ik,
 }
-"""Every player by name. A new one is one more line, with the import inside its function."""
+"""Every player by name, given the effort.
+
+A new one is one more line; what others need not wait for, such as learned weights, it imports and
+loads inside its function.
+"""
 
 
-def _dynamic_tracker() -> Tracker:
-    from pianomime.track import DynamicTracker
+def _searching(effort: int) -> Tracker:
+    tracker: Tracker = DynamicTracker()
+    return RolloutTracker(tracker, RolloutConfig.of_effort(effort)) if effort else tracker
 
-    return DynamicTracker()
 
-
-def _ik_tracker() -> Tracker:
-    from pianomime.track import IkTracker
-
+def _plain_ik(_: int) -> Tracker:
     return IkTracker()
 
 
-DEMONSTRATION_PLAYERS: dict[str, Callable[[], Tracker]] = {
-    "demonstration": _dynamic_tracker,
-    "demonstration-ik": _ik_tracker,
+DEMONSTRATION_PLAYERS: dict[str, Callable[[int], Tracker]] = {
+    "demonstration": _searching,
+    "demonstration-ik": _plain_ik,
 }
-"""Every player of demonstrations by name, with its tracker."""
+"""The tracker of every player of demonstrations, by the player's name, given the effort."""

@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import traceback
 import warnings
 from pathlib import Path
@@ -18,9 +19,10 @@ from types import TracebackType
 from typing import Any
 
 from pianomime.errors import InputError
+from pianomime.explain import explain, frames_by_cause
 from pianomime.music import Score
+from pianomime.numbers import numbers
 from pianomime.play import Player, excerpt
-from pianomime.report.numbers import numbers
 
 
 class SongWorker:
@@ -28,11 +30,15 @@ class SongWorker:
 
     Args:
         player: name of the player.
+        effort: how hard it tries, 0 to 3.
         seconds: how much of a song to play at most [s].
     """
 
-    def __init__(self, player: str, seconds: float) -> None:
-        self._arguments = [player, str(seconds)]
+    def __init__(self, player: str, effort: int, seconds: float) -> None:
+        self._arguments = [player, str(effort), str(seconds)]
+        # One thread may wait for a song in `play` while another calls `close`.
+        self._lock = threading.Lock()
+        self._closed = False
         self._process = self._start()
 
     @property
@@ -49,16 +55,19 @@ class SongWorker:
             line = self._process.stdout.readline()
         except BrokenPipeError:
             line = ""
-        if line:
+        if line.endswith("\n"):
             row: dict[str, Any] = json.loads(line)
             return row
         code = self._process.wait()
-        self.close()
-        self._process = self._start()
+        with self._lock:
+            if not self._closed:
+                self._process = self._start()
         return {"song": song.stem, "error": f"its process died (exit code {code})"}
 
     def close(self) -> None:
-        """End the process, also in the middle of a song."""
+        """End the process, also in the middle of a song, for good."""
+        with self._lock:
+            self._closed = True
         self._process.kill()
         self._process.wait()
 
@@ -89,8 +98,12 @@ class SongWorker:
 def _row(song: Path, player: Player, seconds: float) -> dict[str, Any]:
     try:
         score = excerpt(Score.from_midi(song), seconds=seconds)
+        performance = player.play(score)
         # Two files can bear one title, but not one name in a folder.
-        return {**numbers(player.play(score)), "song": song.stem}
+        row: dict[str, Any] = {**numbers(performance), "song": song.stem}
+        if performance.plan is not None:
+            row["causes"] = frames_by_cause(explain(performance))
+        return row
     except (InputError, OSError) as error:
         return {"song": song.stem, "error": str(error)}
     except Exception as error:  # A bug of ours must not cost the other songs either.
@@ -101,13 +114,13 @@ def _row(song: Path, player: Player, seconds: float) -> dict[str, Any]:
 
 def main() -> None:
     """Answer until the input ends."""
-    name, seconds = sys.argv[1:]
+    name, effort, seconds = sys.argv[1:]
     # Anything that a library prints must not get between the rows.
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     # What warnings tell, such as that the physics broke, is counted in the row.
     warnings.simplefilter("ignore")
-    player = Player.from_name(name)
+    player = Player.from_name(name, int(effort))
     for line in sys.stdin:
         row = _row(Path(json.loads(line)), player, float(seconds))
         print(json.dumps(row, allow_nan=False), file=answers, flush=True)

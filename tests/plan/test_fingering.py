@@ -109,8 +109,12 @@ def test_hands_share_what_is_far_apart() -> None:
 
 
 def test_a_stretch_beyond_ten_fingers_is_dropped_not_refused() -> None:
-    fingering = find_fingering(chord([0, 20, 44, 66, 87]))
+    keys = np.array([0, 12, 44, 66, 76])
+    fingering = find_fingering(chord(list(keys)))
     assert 1 <= (fingering.hand < 0).sum() <= 3
+    for hand in (LEFT, RIGHT):
+        along = key_centres()[keys[fingering.hand == hand], 1]
+        assert np.ptp(along) < 0.24
 
 
 def test_two_voices_on_one_key_share_a_finger() -> None:
@@ -120,7 +124,6 @@ def test_two_voices_on_one_key_share_a_finger() -> None:
     assert len({(hand, finger) for _, (hand, finger, *_) in played}) == 1
 
 
-@pytest.mark.xfail(raises=ValueError, strict=False, reason="find_fingering needs a note")
 def test_no_notes() -> None:
     empty = Score(np.array([], int), np.array([]), np.array([]), np.array([], int))
     assert find_fingering(empty).hand.shape == (0,)

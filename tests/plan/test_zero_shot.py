@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 
 from any_score import chord, melody, score_of, scores
 from pianomime.music import Score
 from pianomime.plan import NO_KEY, FingertipPlan, ZeroShotPlanner
 from pianomime.song_files import find_song
 from pianomime.world.figures import key_centres
-
-one_frame = pytest.mark.xfail(
-    raises=ValueError, strict=False, reason="smooth_path cannot do with a single frame yet"
-)
 
 
 def empty() -> Score:
@@ -42,7 +38,6 @@ def check(score: Score, plan: FingertipPlan) -> None:
 @settings(max_examples=20, deadline=None)
 @given(score=scores())
 def test_laws_of_any_plan(score: Score) -> None:
-    assume(score.frames() > 1)
     check(score, ZeroShotPlanner().plan(score))
 
 
@@ -57,7 +52,7 @@ def test_laws_of_plans_of_songs(song: str) -> None:
 @pytest.mark.parametrize(
     "score",
     [
-        pytest.param(chord([40], 0, 0), marks=one_frame),
+        chord([40], 0, 0),
         chord([40], 0, 1),
         chord(list(range(40, 52))),
         chord(list(range(88)), 0, 2),
@@ -70,7 +65,6 @@ def test_laws_of_odd_plans(score: Score) -> None:
     check(score, ZeroShotPlanner().plan(score))
 
 
-@one_frame
 def test_nothing_to_play() -> None:
     plan = ZeroShotPlanner().plan(empty())
     check(empty(), plan)

@@ -153,7 +153,7 @@ def test_plays_an_easy_song() -> None:
     assert frame_metrics(score.roll(), pressed).f1 > 0.85
 
 
-@pytest.mark.parametrize("frames", [2, 3])
+@pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("make", [DynamicTracker, IkTracker])
 def test_short_plans(make: type[DynamicTracker] | type[IkTracker], frames: int) -> None:
     away, _ = follow(make(), plan_of([swinging(hand, frames) for hand in HANDS.values()]))

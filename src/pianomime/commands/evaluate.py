@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -26,12 +27,14 @@ class Evaluate:
     """MIDI files, folders of them, or names of bundled songs."""
     player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
     """Name of the player."""
+    effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
+    """How hard to try: 0 plays straight away, 1 to 3 try out variations of what goes wrong."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much of each song to play at most, from its first note [s]."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Songs played at the same time; one a core if not given."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
-    """Folder for the results; out/evaluate-PLAYER if not given."""
+    """Folder for the results; out/evaluate-PLAYER-EFFORT if not given."""
 
     def run(self) -> None:
         """Evaluate and print.
@@ -43,7 +46,7 @@ class Evaluate:
         from pianomime.commands.progress import bars
         from pianomime.evaluation import evaluate, markdown
 
-        out = self.out or Path("out", f"evaluate-{self.player}")
+        out = self.out or Path("out", f"evaluate-{self.player}-{self.effort}")
         with bars() as tell:
             results = evaluate(
                 self.paths,
@@ -51,7 +54,12 @@ class Evaluate:
                 self.seconds,
                 self.jobs,
                 out,
-                progress=lambda done, total, f1: tell("songs", done, total, f"mean F1 {f1:.3f}"),
+                progress=lambda done, total, f1: tell("songs", done, total, _remark(f1)),
+                effort=self.effort,
             )
         print(markdown(results))
         print(f"saved: {out / 'results.json'}")
+
+
+def _remark(f1: float) -> str:
+    return "" if math.isnan(f1) else f"mean F1 {f1:.3f}"

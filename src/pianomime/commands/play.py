@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from pianomime.music import Score
+    from pianomime.numbers import Row
     from pianomime.play import Player
-    from pianomime.report import Row
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class Play:
     Examples:
       pianomime play ode-to-joy
       pianomime play SONG.mid -o out/song --no-video
+      pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
       pianomime play DEMO.npz --player demonstration-ik
     """
@@ -37,8 +38,10 @@ class Play:
     """Folder for the report; out/NAME if not given."""
     player: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Name of the player; zero-shot if not given, and for demonstrations, demonstration."""
+    effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
+    """How hard to try: 0 plays straight away, 1 to 3 try out variations of what goes wrong."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
-    """How much to play at most, from the first note at or after START [s]."""
+    """How much to play at most, from what sounds at START or first after it [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in the song to begin [s]."""
     video: bool = True
@@ -79,11 +82,11 @@ class Play:
 
             shown = Demonstration.load(self.song).excerpt(self.start, self.seconds)
             if self.player in PLAYERS:
-                player = Player.from_name(self.player)
+                player = Player.from_name(self.player, self.effort)
             else:
-                player = Player.from_demonstration(shown, self.player or "")
+                player = Player.from_demonstration(shown, self.player or "", self.effort)
             return player, shown.score, Path(self.song).stem
-        player = Player.from_name(self.player or "zero-shot")
+        player = Player.from_name(self.player or "zero-shot", self.effort)
         midi = find_song(self.song)
         score = excerpt(Score.from_midi(midi), self.start, self.seconds)
         return player, score, midi.stem

@@ -15,6 +15,7 @@ from pianomime.plan.fingertip_plan import LEFT, RIGHT
 from pianomime.world.figures import BLACK, CONTROL_DT, key_centres
 
 _FINGERS = 5
+_MOST_DROPPED = 2
 # Where the fingers of a right hand lie along the keyboard when it is at ease, thumb first [m].
 _EASE = np.array([-0.062, -0.024, 0.0, 0.023, 0.046])
 # How far from there each one is played without effort [m].
@@ -27,7 +28,7 @@ _REACH = np.array([0.065, 0.040, 0.040, 0.040, 0.048])
 class FingeringConfig:
     """Costs of the search; 1 is a small inconvenience."""
 
-    beam: int = 40
+    beam: int = 80
     """Partial fingerings kept at each onset."""
     drop: float = 12.0
     """For a note that no finger plays, and"""
@@ -35,10 +36,14 @@ class FingeringConfig:
     """for each frame that it would have sounded, or that a held note is cut short by."""
     cut: float = 15.0
     """For a held note that is let go early, on top."""
-    travel_speed: float = 0.5
+    travel_speed: float = 0.4
     """[m/s] of a hand that costs 1 (it grows with the square)."""
+    late: float = 30.0
+    """For a hand that cannot be there in time, at most."""
     hop_speed: float = 0.25
     """[m/s] of a finger from key to key, relative to its hand, that costs 1."""
+    reuse: float = 20.0
+    """For a finger that goes straight from one key to another; less, the longer it was free."""
     thumb_on_black: float = 0.8
     weak_finger: float = 0.3
     """For ring and little finger on any note."""
@@ -67,14 +72,17 @@ class Fingering:
 def find_fingering(score: Score, config: FingeringConfig | None = None) -> Fingering:
     """Search the cheapest fingering, onset by onset, keeping the best partial ones.
 
-    A note is left out where no finger is free for it within reach, or where reaching it costs
-    more than leaving it out; of more than ten notes struck at once the inner ones go first.
+    A note is left out where no finger can reach it, or where reaching it in time costs more
+    than leaving it out. Of more than ten notes struck at once the inner ones are left out first;
+    where a chord stays out of reach without two of its notes, all of it is.
     """
     config = config or FingeringConfig()
     frames = score.note_frames()
     fingering = Fingering(
         np.full(len(score), -1, np.int8), np.full(len(score), -1, np.int8), frames[:, 1].copy()
     )
+    if not len(score):
+        return fingering
     beam = _Beam.start()
     history = []
     onsets, event = np.unique(frames[:, 0], return_inverse=True)
@@ -222,23 +230,26 @@ class _Beam:
         centre = np.where(count > 0, wish, before)
         stray = np.where(busy, at - ease - centre[..., None], 0.0)
         cost = ((stray / _SPREAD) ** 2).sum(axis=2)
-        cost += np.where((np.abs(stray) > _REACH).any(axis=2), 50.0, 0.0)
+        cost[(np.abs(stray) > _REACH).any(axis=2)] = np.inf
         # Travel: the hand can leave when the last of its released fingers has come up.
         free_since = np.where(held, 0, until).max(axis=1)
         seconds = (np.maximum(onset - free_since, 0) + 1) * CONTROL_DT
         travel = np.abs(centre - before)
-        cost += np.where(
-            struck.any(axis=1), (travel / seconds[:, None] / config.travel_speed) ** 2, 0.0
-        )
+        effort = (travel / seconds[:, None] / config.travel_speed) ** 2
+        # The first note of a hand comes late rather than never: no other suffers from it.
+        most = np.where((last >= 0).any(axis=1), config.late, 0.5 * config.drop)
+        cost += np.where(struck.any(axis=1), np.minimum(effort, most[:, None]), 0.0)
         # Hop: a finger that goes to another key, on top of what the hand carries it.
         idle = (onset - until + 1) * CONTROL_DT
+        hops = struck[None] & (last[:, None] >= 0) & (strikes[None] != last[:, None])
         moved = np.where(
-            struck[None] & (last[:, None] >= 0) & (strikes[None] != last[:, None]),
+            hops,
             np.abs(along[strikes[None]] - along[last[:, None]] - (centre - before)[..., None])
             + 0.01,
             0.0,
         )
         cost += ((moved / idle[:, None] / config.hop_speed) ** 2).sum(axis=2)
+        cost += (hops * config.reuse * ((CONTROL_DT / idle) ** 2)[:, None]).sum(axis=2)
         cost += config.weak_finger * struck[:, 3:].sum(axis=1)
         cost += config.thumb_on_black * (struck[:, 0] & np.take(BLACK, strikes[:, 0]))
         return cost, centre
@@ -259,14 +270,13 @@ def _options(notes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     Returns:
         options (O, notes): the finger 0..4 of one hand on each note, -1 for none; and
         pairs (P, 2): which options of the left and the right hand go together. Fingers keep
-        their order along the keyboard; at most two notes are left out.
+        their order along the keyboard; at most two notes are left out, or all.
     """
     rows: dict[tuple[int, ...], int] = {}
     pairs = []
     # Ten fingers from bass to treble: left little .. left thumb, right thumb .. right little.
     left = [4, 3, 2, 1, 0]
-    most_dropped = 2 if notes <= 4 else 1
-    for played in range(max(0, notes - most_dropped), min(notes, 2 * _FINGERS) + 1):
+    for played in sorted({0, *range(max(0, notes - _MOST_DROPPED), notes + 1)}):
         for which in combinations(range(notes), played):
             for places in combinations(range(2 * _FINGERS), played):
                 mine = np.full((2, notes), -1)

@@ -184,10 +184,9 @@ def _step(
     for below in range(HAND_JOINTS):
         column = np.arange(HAND_JOINTS - below)
         band[below][:, column] = blocks[:, column + below, column]
-    ties = np.full((3, frames, 1), [[[6.0]], [[-4.0]], [[1.0]]])
-    ties[0, -2:, 0] = 5.0, 1.0
-    ties[1, -2:, 0] = -2.0, 0.0
-    ties[2, -2:, 0] = 0.0
+    # A frame is part of its own second difference and, but for the last two, of the next two's.
+    later, latest = ((np.arange(frames) < frames - lag)[:, None] for lag in (1, 2))
+    ties = (1.0 + 4.0 * later + latest, -2.0 * later - 2.0 * latest, 1.0 * latest)
     for lag in range(3):
         band[lag * HAND_JOINTS] += ties[lag] * stiffness
     step: NDArray[np.float64] = solveh_banded(

@@ -6,7 +6,7 @@ import base64
 from html import escape
 from string import Template
 
-from pianomime.report.numbers import Row
+from pianomime.numbers import Row
 
 _PAGE = Template("""\
 <!doctype html>
@@ -68,7 +68,8 @@ footer { color: var(--faint); font-size: .85rem; }
 <body>
 <main>
 <h1>$song</h1>
-<p class="under">Played by two simulated Shadow hands &middot; player <b>$player</b></p>
+<p class="under">Played by two simulated Shadow hands &middot; player <b>$player</b>,
+effort $effort</p>
 $warning<dl class="tiles">
 $tiles</dl>
 $film<section>
@@ -128,7 +129,7 @@ def page(
     """The report as one self-contained HTML page.
 
     Args:
-        numbers: what `pianomime.report.numbers` gives.
+        numbers: what `pianomime.numbers` gives.
         version: of PianoMime.
         played: MP3 of the performance.
         wanted: MP3 of the score.
@@ -159,6 +160,7 @@ def page(
     return _PAGE.substitute(
         song=escape(str(numbers["song"])),
         player=escape(str(numbers["player"])),
+        effort=numbers["effort"],
         version=escape(version),
         tiles="".join(tiles),
         rows="".join(rows),

@@ -10,11 +10,14 @@ from matplotlib.colors import to_rgb
 
 from pianomime import __version__
 from pianomime.music import render_audio, write_wav
+from pianomime.numbers import Row, numbers
 from pianomime.performance import Performance
 from pianomime.report.mp3 import mp3
-from pianomime.report.numbers import Row, numbers
 from pianomime.report.page import page
-from pianomime.report.picture import DARK, LIGHT, draw
+from pianomime.report.picture import draw
+from pianomime.report.roll import DARK, LIGHT
+from pianomime.world.render import RenderUnavailable, write_video
+from pianomime.world.scene_look import key_colours
 
 FILES = (
     "report.html",
@@ -61,10 +64,6 @@ def write_report(
     draw(performance, folder / "piano_roll.png", LIGHT)
     draw(performance, folder / "piano_roll_dark.png", DARK)
     if video:
-        # Imported here: OpenGL is looked for on import, and most machines without it want none.
-        from pianomime.world.render import RenderUnavailable, write_video
-        from pianomime.world.scene_look import key_colours
-
         colours = key_colours(performance.pressed)
         colours[performance.pressed & ~performance.score.roll()] = to_rgb(LIGHT.wrong)
         try:

@@ -2,6 +2,15 @@
 
 from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
+from pianomime.track.rollout import RolloutConfig, RolloutTracker
 from pianomime.track.tracker import Tracker
 
-__all__ = ["DynamicConfig", "DynamicTracker", "IkConfig", "IkTracker", "Tracker"]
+__all__ = [
+    "DynamicConfig",
+    "DynamicTracker",
+    "IkConfig",
+    "IkTracker",
+    "RolloutConfig",
+    "RolloutTracker",
+    "Tracker",
+]

@@ -94,7 +94,7 @@ class DynamicTracker:
         one: it is lifted above the keys until it has come across. So is an idle finger that
         has sunk between the keys.
         """
-        ctrl = self._feedforward[frame].copy()
+        ctrl: NDArray[np.float64] = self._feedforward[frame].copy()
         qpos = world.qpos
         for index, hand in enumerate(self._hands):
             here = qpos[hand.joints]

@@ -100,5 +100,5 @@ def bounded_least_squares(
     rows = np.vstack([jacobian, np.sqrt(damping) * np.eye(len(low))])
     # lsq_linear wants a box with an inside.
     result = lsq_linear(rows, np.r_[error, np.zeros(len(low))], (low, np.maximum(high, low + 1e-9)))
-    x: NDArray[np.float64] = result.x
-    return x
+    inside: NDArray[np.float64] = np.clip(result.x, low, high)
+    return inside

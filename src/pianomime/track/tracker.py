@@ -18,5 +18,9 @@ class Tracker(Protocol):
         """Prepare for a plan: everything that can be computed before the music starts."""
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """The control (46,) for `World.step` in this frame, from the state before it."""
+        """The control (46,) for `World.step` in this frame, from the state before it.
+
+        It depends on plan, frame and world alone: a tracker that looks ahead may ask for a frame
+        more than once, on copies of the world.
+        """
         ...

@@ -36,16 +36,18 @@ class WorldBatch(Moment):
             broke; it is then put back as `World` tells.
     """
 
-    def __init__(self, worlds: int, threads: int = 0) -> None:
+    def __init__(self, worlds: int, threads: int = 0, quiet: bool = False) -> None:
         """Make worlds, at rest.
 
         Args:
             worlds: how many, B.
             threads: how many of them step at the same time; 0 for one on each core.
+            quiet: whether broken physics goes without a warning.
         """
         if worlds < 1 or threads < 0:
             raise ValueError(f"cannot make {worlds} worlds on {threads} threads")
         self.model = world_model()
+        self.quiet = quiet
         # Which keys sleep is not part of MuJoCo's state: each world keeps its own data.
         self._batch = Batch(self.model, worlds, threads, persistent=True)
         self.blow_ups = np.zeros(worlds, np.int64)
@@ -87,13 +89,14 @@ class WorldBatch(Moment):
         before = self.qpos
         self._batch.bind("ctrl")[:] = wanted
         self.pedal[:] = pedal
+        self._stir_keys()
         self._batch.step(nstep=SUBSTEPS)
         broken = self._broken()
         if len(broken):
             self.blow_ups[broken] += 1
-            warnings.warn(
-                f"{BLOW_UP} (worlds {', '.join(map(str, broken))})", PhysicsWarning, stacklevel=2
-            )
+            if not self.quiet:
+                which = ", ".join(map(str, broken))
+                warnings.warn(f"{BLOW_UP} (worlds {which})", PhysicsWarning, stacklevel=2)
             self._put(clear_of_keys(before[broken]), broken)
 
     def state(self) -> NDArray[np.float64]:

@@ -35,8 +35,8 @@ _GEOM_TYPES = {
 _HAND_MASK = {"contype": 1, "conaffinity": 0}
 _KEY_MASK = {"contype": 0, "conaffinity": 1}
 _NO_CONTACT = {"contype": 0, "conaffinity": 0}
-# Hidden in their neighbours, or never over the keys: not worth looking for contacts.
-_OUT_OF_REACH = ("forearm", "wrist", "knuckle", "thbase", "thhub")
+# Never over the keys: not worth looking for contacts.
+_OUT_OF_REACH = ("forearm", "wrist")
 _FOREARM_BASE = {"rh": (0.4, 0.15, 0.13), "lh": (0.4, -0.15, 0.13)}
 _FOREARM_QUAT = (-0.5, -0.5, 0.5, 0.5)
 
@@ -56,6 +56,7 @@ def world_model() -> mujoco.MjModel:
     # World tells of broken physics itself; nobody wants MUJOCO_LOG.TXT beside their songs.
     log = mujoco.MjLogConfig.get()
     log.logto_file = False
+    log.logto_console = False
     log.set()
     return build_spec().compile()
 

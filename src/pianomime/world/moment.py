@@ -21,6 +21,12 @@ POSITIONS = KEYS + 2 * HAND_JOINTS
 PRESSED_WITHIN: float = FIGURES["keyboard"]["pressed_within"]
 """[rad] A key counts as pressed this close to its stop."""
 
+_DOWN = 0.002
+"""[rad] A key turned by more than this is not at rest, whatever its velocity."""
+_STIR = 2e-3
+"""[rad/s] Upward velocity that MuJoCo does not take for sleep; a key under a finger loses it at
+once, and a free one has many times as much within one step of the physics."""
+
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """The parts of MuJoCo's state that make up a moment."""
 RESETS = [
@@ -63,6 +69,16 @@ class Moment(ABC):
     def pressed(self) -> NDArray[np.bool_]:
         """(..., 88) the keys that sound: within 0.5 degrees of their stop."""
         return pressed(self._positions())
+
+    def _stir_keys(self) -> None:
+        """Keep keys awake that are down.
+
+        MuJoCo lets sleep what does not move. A key that a finger holds down does not move, and
+        slept on, down, when the finger was gone before the spring could move it.
+        """
+        down = self._positions()[..., :KEYS] > _DOWN
+        velocity = self._velocities()[..., :KEYS]
+        velocity[down & (np.abs(velocity) < _STIR)] = -_STIR
 
     @abstractmethod
     def _positions(self) -> NDArray[np.float64]:

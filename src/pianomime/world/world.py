@@ -33,9 +33,11 @@ class World(Moment):
             are then put back along the keyboard to where they were before the step, with the
             hands open in their rest pose above the keys and all keys up: fingers that were
             wedged would break the physics again at once if they were left where they were.
+        quiet: whether that goes without a warning, as in a world that is only imagined.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, quiet: bool = False) -> None:
+        self.quiet = quiet
         self.model = world_model()
         self.data = mujoco.MjData(self.model)
         self._tips = np.array(
@@ -73,10 +75,12 @@ class World(Moment):
         before = self.data.qpos.copy()
         self.data.ctrl[:] = wanted
         self.pedal = bool(pedal)
+        self._stir_keys()
         mujoco.mj_step(self.model, self.data, nstep=SUBSTEPS)
         if self._broken():
             self.blow_ups += 1
-            warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=2)
+            if not self.quiet:
+                warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=2)
             self._put(clear_of_keys(before))
 
     def state(self) -> NDArray[np.float64]:
@@ -107,9 +111,9 @@ class World(Moment):
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, given, STATE)
 
-    def copy(self) -> World:
+    def copy(self, quiet: bool = False) -> World:
         """Another world in the same moment: it goes on as this one does, bit for bit."""
-        other = World()
+        other = World(quiet)
         mujoco.mj_copyData(other.data, self.model, self.data)
         other.blow_ups, other.pedal = self.blow_ups, self.pedal
         return other

@@ -15,14 +15,16 @@ def numbers(performance: Performance) -> Row:
         performance: any performance.
 
     Returns:
-        `song`, `player`; `song_seconds`, `frames`; the metrics `precision`, `recall`, `f1`,
-        `onset_f1`, `pedal_f1` (0..1); `plan_seconds`, `simulate_seconds` and `realtime_factor`
-        (their sum into `song_seconds`, higher is better); `notes` of the score and
-        `dropped_notes` that the planner left out; `blow_ups`, frames in which the physics broke.
+        `song`, `player`, `effort`; `song_seconds`, `frames`; the metrics `precision`, `recall`,
+        `f1`, `onset_f1`, `pedal_f1` (0..1); `plan_seconds`, `simulate_seconds` and
+        `realtime_factor` (their sum into `song_seconds`, higher is better); `notes` of the score
+        and `dropped_notes` that the planner left out; `blow_ups`, frames in which the physics
+        broke.
     """
     return {
         "song": performance.score.title,
         "player": performance.player,
+        "effort": performance.effort,
         "song_seconds": round(performance.song_seconds, 3),
         "frames": len(performance),
         **{name: round(value, 6) for name, value in performance.metrics().items()},

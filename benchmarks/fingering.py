@@ -1,0 +1,131 @@
+"""How often the search chooses the hand and the finger that people choose.
+
+Needs the reference data (PIANOMIME_SHARED names their folder): the fingered pieces of two sets,
+whole, and the held-out clips of pianists, whose fingering was read off their hands. The search's
+costs are set by hand and fitted to none of them.
+
+- played: the share of the notes that the search gives to some finger.
+- same hand, same finger: the share of all notes with the same hand, or hand and finger, as in the
+  human fingering; a note that the search leaves out counts as different.
+- same finger in the same hand: of those with the same hand.
+
+There is more than one good fingering, and people differ too: 1 is no aim.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import common
+from pianomime.music import Score
+from pianomime.plan.fingering import find_fingering
+from pianomime.plan.fingertip_plan import LEFT, RIGHT
+from pianomime.world.figures import KEYS
+
+_LOWEST_MIDI = 21
+# A note of a fingering and one of the MIDI file at this distance are the same [s].
+_SAME_TIME = 0.005
+_SETS = ("etude12", "repertoire", "clips")
+
+
+class Piece(NamedTuple):
+    """A score with a human fingering.
+
+    Attributes:
+        score: N notes.
+        hand, finger: (N,) as in a FingertipPlan; -1 where the human's is not known.
+    """
+
+    score: Score
+    hand: NDArray[np.int64]
+    finger: NDArray[np.int64]
+
+
+class Count(NamedTuple):
+    """Notes of one piece."""
+
+    notes: int
+    known: int
+    played: int
+    same_hand: int
+    same_finger: int
+
+
+def fingered(folder: Path) -> Iterator[Piece]:
+    """The pieces of a folder with a `fingering.json`."""
+    rows = json.loads((folder / "fingering.json").read_text("utf-8"))["pieces"]
+    for name in sorted(rows):
+        score = Score.from_midi(folder / f"{name}.mid")
+        hand, finger = np.full((2, len(score)), -1)
+        for start, _, pitch, _, number in rows[name]:
+            time = np.where(score.key == pitch - _LOWEST_MIDI, np.abs(score.onset - start), np.inf)
+            note = int(time.argmin())
+            if time[note] < _SAME_TIME:
+                side, finger[note] = divmod(number, 5)
+                hand[note] = LEFT if side else RIGHT
+        yield Piece(score, hand, finger)
+
+
+def clips(shared: Path) -> Iterator[Piece]:
+    """The held-out clips: the finger that is on a note's key for most of its frames."""
+    with np.load(shared / "data" / "pianomime" / "demonstrations.npz") as file:
+        human = dict(file)
+    ends = np.cumsum(human["length"])
+    for clip in np.flatnonzero(human["split"] == "test"):
+        rows = slice(ends[clip] - human["length"][clip], ends[clip])
+        goal = np.unpackbits(human["goal_packed"][rows], axis=1)[:, :KEYS].astype(bool)
+        score = Score.from_roll(goal)
+        hand, finger = np.full((2, len(score)), -1)
+        for note, (first, stop) in enumerate(score.note_frames()):
+            frames = (human["finger_key"][rows][first:stop] == score.key[note]).sum(axis=0)
+            if frames.any():
+                hand[note], finger[note] = np.unravel_index(frames.argmax(), frames.shape)
+        yield Piece(score, hand, finger)
+
+
+def compare(piece: Piece) -> Count:
+    """How far the search and the human agree."""
+    found = find_fingering(piece.score)
+    known = piece.hand >= 0
+    same_hand = known & (found.hand == piece.hand)
+    same_finger = same_hand & (found.finger == piece.finger)
+    played = known & (found.hand >= 0)
+    return Count(
+        len(known), *(int(which.sum()) for which in (known, played, same_hand, same_finger))
+    )
+
+
+def main() -> None:
+    arguments = common.parser("fingering", __doc__).parse_args()
+    shared = common.shared()
+    facts = common.machine()
+    common.show_machine(facts)
+    sets: dict[str, Any] = {}
+    with ProcessPoolExecutor(len(common.cores())) as pool:
+        for name in _SETS:
+            pieces = clips(shared) if name == "clips" else fingered(shared / "data" / name)
+            counts = list(pool.map(compare, pieces))
+            total = Count(*(sum(column) for column in zip(*counts, strict=True)))
+            sets[name] = {
+                "pieces": len(counts),
+                "notes": total.notes,
+                "with human fingering": total.known,
+                "played": total.played / total.known,
+                "same hand": total.same_hand / total.known,
+                "same finger": total.same_finger / total.known,
+                "same finger in the same hand": total.same_finger / total.same_hand,
+            }
+    heads = ["set", *sets[_SETS[0]]]
+    common.table(heads, [[name, *row.values()] for name, row in sets.items()])
+    common.report(arguments.output, facts, {"sets": sets})
+
+
+if __name__ == "__main__":
+    main()

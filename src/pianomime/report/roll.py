@@ -1,0 +1,225 @@
+"""What every picture of a piano roll is drawn on: colours, lines of music, heading."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pianomime.performance import FRAMES_A_SECOND, Performance
+
+WIDTH = 12.0
+"""Of every picture [inches]."""
+LEFT_EDGE, RIGHT_EDGE = 0.055, 0.98
+"""Between which lines of music and headings lie, as shares of the width."""
+
+_ROW_SECONDS = 16.0
+"""Music on a line at most: semiquavers at a quick tempo can still be told apart."""
+_MOST_ROWS = 24
+"""More music than fits on these lines (over 6 minutes) is packed more densely."""
+_FEWEST_KEYS = 36
+_LOWEST_MIDI = 21  # key 0 is A0
+_BLACK = (1, 3, 6, 8, 10)  # within an octave from C
+_NAMES = ("C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯", "A", "A♯", "B")
+_FOOT = 0.2  # [inches]
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours of a picture; the hands', left, right and neither, are those of the film."""
+
+    paper: str
+    black_keys: str
+    lines: str
+    text: str
+    faint_text: str
+    hands: tuple[str, str, str]
+    wanted: tuple[str, str, str]
+    wrong: str
+
+
+LIGHT = Theme(
+    paper="#ffffff",
+    black_keys="#f5f6f8",
+    lines="#dde1e7",
+    text="#1c2430",
+    faint_text="#6b7686",
+    hands=("#2467c9", "#e58a00", "#8a94a3"),
+    wanted=("#cadcf6", "#fbe2b8", "#dfe3e8"),
+    wrong="#d3124a",
+)
+DARK = Theme(
+    paper="#171b21",
+    black_keys="#12151a",
+    lines="#2c333d",
+    text="#e8ecf2",
+    faint_text="#8d98a8",
+    hands=("#5b9bf0", "#f2a232", "#7d8795"),
+    wanted=("#22395c", "#503a16", "#343b45"),
+    wrong="#ff4d7d",
+)
+
+
+class Layer(NamedTuple):
+    """Boxes of one colour on a roll.
+
+    Attributes:
+        corners: (M, 4, 2) [s, keys], as `corners` gives them.
+        face, edge: colours.
+    """
+
+    corners: NDArray[np.float64]
+    face: str
+    edge: str
+
+
+@dataclass(frozen=True)
+class Lines:
+    """How the roll of a performance is broken into lines of music.
+
+    Attributes:
+        rows: number of lines.
+        row_seconds: music on each [s].
+        low, high: lowest and one past the highest key to show.
+        broken: [s] when the physics broke.
+    """
+
+    rows: int
+    row_seconds: int
+    low: int
+    high: int
+    broken: tuple[float, ...]
+
+    @classmethod
+    def of(cls, performance: Performance) -> Lines:
+        """The lines that all that was wanted and played fits on."""
+        # A score of 30 s has 601 frames; the silent last one is not worth a line.
+        seconds = performance.song_seconds - 0.1
+        rows = min(_MOST_ROWS, max(1, math.ceil(seconds / _ROW_SECONDS)))
+        broken = tuple(float(frame) / FRAMES_A_SECOND for frame in performance.blow_ups)
+        return cls(rows, math.ceil(max(seconds / rows, 1.0)), *_key_range(performance), broken)
+
+    @property
+    def height(self) -> float:
+        """Of all lines together [inches]."""
+        return self.rows * self._row_height + _FOOT
+
+    @property
+    def _row_height(self) -> float:
+        return 0.6 + 0.052 * (self.high - self.low)
+
+    def draw(self, figure: Figure, layers: Sequence[Layer], theme: Theme) -> None:
+        """Draw the lines at the foot of a figure, the last layer on top."""
+        height = figure.get_figheight()
+        for row in range(self.rows):
+            bottom = self.height - (row + 1) * self._row_height + 0.35
+            axes = figure.add_axes(
+                (
+                    LEFT_EDGE, bottom / height,
+                    RIGHT_EDGE - LEFT_EDGE, (self._row_height - 0.35) / height,
+                ),
+                facecolor=theme.paper,
+            )  # fmt: skip
+            _paper(axes, self.low, self.high, theme)
+            begin, end = row * self.row_seconds, (row + 1) * self.row_seconds
+            for layer in layers:
+                here = (layer.corners[:, 0, 0] < end) & (layer.corners[:, 2, 0] > begin)
+                rectangles = PolyCollection(
+                    list(layer.corners[here]),
+                    facecolors=layer.face,
+                    edgecolors=layer.edge,
+                    linewidths=0.7,
+                )
+                axes.add_collection(rectangles)
+                rectangles.set_zorder(3)  # above the line of each C
+            for second in self.broken:
+                axes.axvline(second, color=theme.wrong, linewidth=0.8, linestyle=":")
+            axes.set_xlim(begin, end)
+            axes.set_ylim(self.low - 3.2, self.high + 1)
+        figure.axes[-1].set_xlabel("seconds", color=theme.faint_text, fontsize=9)
+
+
+def corners(runs: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(M, 4, 2) corners [s, keys] of the boxes of runs (M, 3): first frame, end frame, key."""
+    start, end = runs[:, 0] / FRAMES_A_SECOND, runs[:, 1] / FRAMES_A_SECOND
+    low, high = runs[:, 2] + 0.08, runs[:, 2] + 0.92
+    return np.stack([start, low, start, high, end, high, end, low], axis=1).reshape(-1, 4, 2)
+
+
+def runs(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(M, 3) first frame, end frame and column of each unbroken run of true cells (T, K)."""
+    padded = np.pad(cells, ((1, 1), (0, 0))).astype(np.int8).T
+    column, start = np.nonzero(np.diff(padded) == 1)
+    _, end = np.nonzero(np.diff(padded) == -1)
+    return np.stack([start, end, column], axis=1)
+
+
+def key_name(key: int) -> str:
+    """Name of a key 0..87, such as C4 for middle C."""
+    octave, step = divmod(key + _LOWEST_MIDI, 12)
+    return f"{_NAMES[step]}{octave - 1}"
+
+
+def sheet(height: float, title: str, remark: str, theme: Theme) -> Figure:
+    """An empty picture with a title at the top left and a remark at the top right.
+
+    Args:
+        height: of the picture [inches].
+        title: shortened if it is too long.
+        remark: one line.
+        theme: colours.
+    """
+    figure = Figure(figsize=(WIDTH, height), dpi=110, facecolor=theme.paper)
+    figure.text(
+        LEFT_EDGE, 1 - 0.34 / height, title if len(title) <= 48 else f"{title[:47]}…",
+        color=theme.text, fontsize=15, fontweight="bold", va="center",
+    )  # fmt: skip
+    figure.text(
+        RIGHT_EDGE, 1 - 0.34 / height, remark,
+        color=theme.faint_text, fontsize=10.5, va="center", ha="right",
+    )  # fmt: skip
+    return figure
+
+
+def legend(figure: Figure, entries: Sequence[Artist], theme: Theme) -> None:
+    """One line of a legend below the title."""
+    figure.legend(
+        handles=list(entries), loc="center left",
+        bbox_to_anchor=(0.047, 1 - 0.7 / figure.get_figheight()),
+        ncols=len(entries), frameon=False, labelcolor=theme.text, fontsize=9.5,
+        handlelength=1.3, handleheight=0.8, columnspacing=1.6, handletextpad=0.5,
+    )  # fmt: skip
+
+
+def _key_range(performance: Performance) -> tuple[int, int]:
+    """Lowest and one past the highest key to show."""
+    used = np.flatnonzero(performance.pressed.any(axis=0) | performance.score.roll().any(axis=0))
+    low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (40, 40)
+    middle = (low + high) / 2
+    low = max(0, min(low - 2, int(middle - _FEWEST_KEYS / 2)))
+    high = min(88, max(high + 2, low + _FEWEST_KEYS))
+    return low, high
+
+
+def _paper(axes: Axes, low: int, high: int, theme: Theme) -> None:
+    """Stripes for black keys, a line and a label for every C."""
+    for key in range(low, high):
+        if (key + _LOWEST_MIDI) % 12 in _BLACK:
+            axes.axhspan(key, key + 1, color=theme.black_keys, linewidth=0)
+    octaves = [key for key in range(low, high) if (key + _LOWEST_MIDI) % 12 == 0]
+    for key in octaves:
+        axes.axhline(key, color=theme.lines, linewidth=0.8)
+    axes.set_yticks([key + 0.5 for key in octaves], [key_name(key) for key in octaves])
+    axes.tick_params(colors=theme.faint_text, labelsize=8.5, length=0)
+    axes.xaxis.grid(visible=True, color=theme.lines, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
