@@ -44,13 +44,20 @@ class Command(NamedTuple):
 COMMANDS = {
     "play": Command("pianomime.commands.play", "Play", "play a song and report on it"),
     "evaluate": Command("pianomime.commands.evaluate", "Evaluate", "play and score many songs"),
+    "retarget": Command(
+        "pianomime.commands.retarget", "Retarget", "make a demonstration of a video"
+    ),
+    "pick": Command("pianomime.commands.pick", "Pick", "show where the keyboard is in a video"),
+    "import-demos": Command(
+        "pianomime.commands.import_demos", "ImportDemos", "read the paper's demonstrations"
+    ),
     "explain": Command("pianomime.commands.explain", "Explain", "say why notes went wrong"),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }
 
 
 def _help() -> str:
-    listed = "\n".join(f"  {name:<10} {command.summary}" for name, command in COMMANDS.items())
+    listed = "\n".join(f"  {name:<13} {command.summary}" for name, command in COMMANDS.items())
     return (
         "usage: pianomime COMMAND ...\n\n"
         "Give it a song, and two simulated robot hands play it.\n\n"

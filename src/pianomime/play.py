@@ -20,6 +20,7 @@ from pianomime.track import (
     RolloutTracker,
     Tracker,
 )
+from pianomime.video.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.world import World
 
 Progress = Callable[[str, int, int], None]
@@ -69,6 +70,8 @@ def check_player(name: str, effort: int) -> None:
     """
     if effort not in range(4):
         raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
+    if name in DEMONSTRATION_PLAYERS:
+        raise InputError(f"the player {name!r} plays demonstrations (.npz), not MIDI files")
     if name not in PLAYERS:
         raise InputError(f"there is no player {name!r}; there are: {', '.join(PLAYERS)}")
 
@@ -104,6 +107,31 @@ class Player:
         """
         check_player(name, effort)
         return PLAYERS[name](effort)
+
+    @classmethod
+    def from_demonstration(
+        cls, demonstration: Demonstration, name: str = "", effort: int = EFFORT
+    ) -> Player:
+        """A player that plays one score with the fingertips of the human who demonstrated it.
+
+        Args:
+            demonstration: whose score it plays.
+            name: one of `DEMONSTRATION_PLAYERS`; the first if not given.
+            effort: 0 to 3, see `from_name`.
+
+        Raises:
+            InputError: there is no such player, or no such effort; the message lists those
+                there are.
+        """
+        if effort not in range(4):
+            raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
+        name = name or next(iter(DEMONSTRATION_PLAYERS))
+        if name not in DEMONSTRATION_PLAYERS:
+            there = ", ".join([*DEMONSTRATION_PLAYERS, *PLAYERS])
+            raise InputError(f"there is no player {name!r} of demonstrations; there are: {there}")
+        tracker = DEMONSTRATION_PLAYERS[name](effort)
+        tries = effort if isinstance(tracker, RolloutTracker) else 0
+        return cls(name, DemonstrationPlanner(demonstration), tracker, tries)
 
     def play(self, score: Score, progress: Progress | None = None) -> Performance:
         """Perform a score from the rest pose; the same score gives the same performance.
@@ -153,10 +181,7 @@ class Player:
 
 
 def _zero_shot(effort: int) -> Player:
-    tracker: Tracker = DynamicTracker()
-    if effort:
-        tracker = RolloutTracker(tracker, RolloutConfig.of_effort(effort))
-    return Player("zero-shot", ZeroShotPlanner(), tracker, effort)
+    return Player("zero-shot", ZeroShotPlanner(), _searching(effort), effort)
 
 
 def _zero_shot_ik(_: int) -> Player:
@@ -172,3 +197,19 @@ PLAYERS: dict[str, Callable[[int], Player]] = {
 A new one is one more line; what others need not wait for, such as learned weights, it imports and
 loads inside its function.
 """
+
+
+def _searching(effort: int) -> Tracker:
+    tracker: Tracker = DynamicTracker()
+    return RolloutTracker(tracker, RolloutConfig.of_effort(effort)) if effort else tracker
+
+
+def _plain_ik(_: int) -> Tracker:
+    return IkTracker()
+
+
+DEMONSTRATION_PLAYERS: dict[str, Callable[[int], Tracker]] = {
+    "demonstration": _searching,
+    "demonstration-ik": _plain_ik,
+}
+"""The tracker of every player of demonstrations, by the player's name, given the effort."""

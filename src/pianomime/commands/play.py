@@ -11,7 +11,9 @@ import tyro
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from pianomime.music import Score
     from pianomime.numbers import Row
+    from pianomime.play import Player
 
 
 @dataclass(frozen=True)
@@ -26,14 +28,16 @@ class Play:
       pianomime play SONG.mid -o out/song --no-video
       pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
+      pianomime play DEMO.npz --player demonstration-ik
     """
 
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
-    """A MIDI file, or the name of a bundled song (see `pianomime songs`)."""
+    """A MIDI file, a demonstration (see `pianomime retarget`), or the name of a bundled song (see
+    `pianomime songs`)."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the report; out/NAME if not given."""
-    player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
-    """Name of the player."""
+    player: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Name of the player; zero-shot if not given, and for demonstrations, demonstration."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
     """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
     On two cores 1 takes about as long as the music or less, 2 and 3 several times longer."""
@@ -54,15 +58,10 @@ class Play:
         from rich.console import Console
 
         from pianomime.commands.progress import bars
-        from pianomime.music import Score
-        from pianomime.play import Player, excerpt
         from pianomime.report import FILES, staged, write_report
-        from pianomime.song_files import find_song
 
-        player = Player.from_name(self.player, self.effort)
-        midi = find_song(self.song)
-        score = excerpt(Score.from_midi(midi), self.start, self.seconds)
-        out = self.out or Path("out", midi.stem)
+        player, score, name = self._cast()
+        out = self.out or Path("out", name)
         notes: list[str] = []
         with staged(out, FILES) as folder, bars() as tell:
             row = write_report(
@@ -72,6 +71,26 @@ class Play:
         for note in notes:
             print(note)
         print(f"look and listen: {out / 'report.html'}")
+
+    def _cast(self) -> tuple[Player, Score, str]:
+        """Who plays what, and the name of its file."""
+        from pianomime.music import Score
+        from pianomime.play import PLAYERS, Player, excerpt
+        from pianomime.song_files import find_song
+
+        if Path(self.song).suffix == ".npz":
+            from pianomime.video.demonstration import Demonstration
+
+            shown = Demonstration.load(self.song).excerpt(self.start, self.seconds)
+            if self.player in PLAYERS:
+                player = Player.from_name(self.player, self.effort)
+            else:
+                player = Player.from_demonstration(shown, self.player or "", self.effort)
+            return player, shown.score, Path(self.song).stem
+        player = Player.from_name(self.player or "zero-shot", self.effort)
+        midi = find_song(self.song)
+        score = excerpt(Score.from_midi(midi), self.start, self.seconds)
+        return player, score, midi.stem
 
 
 def _table(row: Row) -> Table:

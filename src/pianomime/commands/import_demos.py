@@ -1,0 +1,50 @@
+"""`pianomime import-demos`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+
+@dataclass(frozen=True)
+class ImportDemos:
+    """Make demonstrations of the paper's published data, with its known faults repaired.
+
+    SOURCE is a folder with PianoMime's high-level zarr data set (needs the package zarr), an .npz
+    file of clips one after the other (length, fingertips, goal_packed), or one of a single clip
+    (fingertips, goal). OUT then holds one .npz for each clip.
+
+    Examples:
+      pianomime import-demos DATASET.zarr -o demos
+      pianomime import-demos reference.npz -o demos
+    """
+
+    source: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="SOURCE")]
+    """The data."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
+    """Folder for the demonstrations; out/demos-SOURCE if not given."""
+    clips: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Only the first N."""
+
+    def run(self) -> None:
+        """Import.
+
+        Raises:
+            InputError: the data are not what they should be.
+            OSError: a file cannot be read or written.
+        """
+        from pianomime.commands.progress import bars
+        from pianomime.video.published import read_published
+
+        out = self.out or Path("out", f"demos-{self.source.stem}")
+        number = 0
+        with bars() as tell:
+            for demonstration, total in read_published(self.source, self.clips):
+                out.mkdir(parents=True, exist_ok=True)
+                demonstration.save(out / f"{demonstration.score.title}.npz")
+                number += 1
+                tell("importing", number, total)
+        print(f"saved {number} demonstrations: {out}")

@@ -1,0 +1,75 @@
+"""`pianomime retarget`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Retarget:
+    """Make a demonstration of a video of somebody playing, seen from above.
+
+    OUT can then be played: `pianomime play OUT`. Beside it lie a page that shows how well hands
+    and keys were seen (OUT with .html) and the video with what was seen drawn into it (.mp4).
+
+    Examples:
+      pianomime retarget VIDEO.mp4 --midi SONG.mid
+      pianomime retarget VIDEO.mp4 --midi SONG.mid --points POINTS.json --offset -3.2
+      pianomime retarget VIDEO.mp4 -o DEMO.npz --no-overlay
+    """
+
+    video: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="VIDEO")]
+    """Any video in which a keyboard is seen from above."""
+    midi: Annotated[Path | None, tyro.conf.arg(metavar="SONG.mid")] = None
+    """What is played; if not given it is read off the video, where keys light up."""
+    points: Annotated[Path | None, tyro.conf.arg(metavar="POINTS.json")] = None
+    """Where the keyboard is, from `pianomime pick`; found by itself if not given."""
+    offset: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
+    """When in the video the MIDI file begins [s], negative if before it; estimated if not given."""
+    hand_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """MediaPipe's hand_landmarker.task; downloaded once if not given."""
+    align: Literal["steady", "paper"] = "steady"
+    """How fingertips are put on keys: the house's way, or step 3 of the paper's appendix A."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="DEMO.npz")] = None
+    """The demonstration; out/VIDEO.npz if not given."""
+    overlay: bool = True
+    """Draw a video of what was seen."""
+
+    def run(self) -> None:
+        """Make the demonstration and tell how good it is.
+
+        Raises:
+            InputError: no demonstration can be made of what was given.
+            OSError: a file cannot be read or written.
+        """
+        from pianomime.commands.progress import bars
+        from pianomime.errors import InputError
+        from pianomime.video.overlay import write_overlay
+        from pianomime.video.retarget import RetargetConfig, retarget
+        from pianomime.video.summary import write_summary
+
+        out = self.out or Path("out", self.video.stem + ".npz")
+        if out.suffix != ".npz":
+            raise InputError(f"{out}: a demonstration is a file that ends in .npz")
+        if out.exists() and out.is_dir():
+            raise InputError(f"{out}: is a folder; a file is needed")
+        config = RetargetConfig(self.midi, self.points, self.offset, self.hand_model, self.align)
+        with bars() as tell:
+            made = retarget(self.video, config, tell)
+            out.parent.mkdir(parents=True, exist_ok=True)
+            if self.overlay:
+                write_overlay(made, out.with_suffix(".mp4"), tell)
+            write_summary(made, out.with_suffix(".html"))
+            made.demonstration.save(out)
+        quality = made.demonstration.quality
+        print(f"keyboard: {quality['keyboard']}")
+        print(f"both hands seen in {quality['both_hands_found']:.1%} of the frames")
+        print(f"notes: {quality['notes']}, fingers guessed: {quality['notes_guessed']}")
+        for remark in made.remarks:
+            print(f"note: {remark}")
+        print(f"look: {out.with_suffix('.html')}")
+        print(f"play it: pianomime play {out}")

@@ -1,0 +1,1 @@
+"""From a video of somebody playing to a Demonstration."""

@@ -1,0 +1,135 @@
+"""From tracked hands and the finger of every note to a FingertipPlan."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.music import Score
+from pianomime.plan import NO_KEY, FingertipPlan
+from pianomime.video.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
+from pianomime.video.note_fingers import NoteFingers
+from pianomime.world.figures import BLACK, key_centres, key_half_sizes
+
+Rule = Literal["steady", "paper"]
+"""How fingertips are put on their keys."""
+
+HIGH = 0.045
+"""[m] z of points that press nothing: twice the height of a key (paper, appendix A, step 4)."""
+
+_LEAD = 8
+"""Frames over which a finger comes over to where it presses, and goes back."""
+_WHITE_X = (-0.020, 0.072)
+_BLACK_X = (-0.055, 0.008)
+"""[m] world x between which a fingertip is on its key; behind, keys need too much force."""
+
+
+def align(
+    score: Score, points: NDArray[np.float64], fingers: NoteFingers, rule: Rule = "steady"
+) -> FingertipPlan:
+    """Put the fingertips that press on the keys that they press.
+
+    Args:
+        score: its times are those of the points.
+        points: (T, 2, 6, 2) world x, y [m] as in `HandTracks`; a row for each frame of the score.
+        fingers: who plays each note. The paper's rule does without.
+        rule: "steady": each finger stays where it pressed for as long as it does, in the middle of
+            its key, and moves there and away smoothly. "paper": appendix A, step 3, frame by
+            frame.
+    """
+    if rule == "paper":
+        return _as_in_the_paper(score, points)
+    finger_key = np.full((len(points), 2, 5), NO_KEY, np.int8)
+    for note, (first, _) in enumerate(score.note_frames()):
+        if fingers.hand[note] >= 0:
+            finger_key[first : fingers.stop[note], fingers.hand[note], fingers.finger[note]] = (
+                score.key[note]
+            )
+    tips = points[:, :, 1:]
+    moved = tips.copy()
+    for hand in range(2):
+        for finger in range(5):
+            moved[:, hand, finger] += _shift(tips[:, hand, finger], finger_key[:, hand, finger])
+    return FingertipPlan(
+        _with_height(np.concatenate((points[:, :, :1], moved), axis=2), finger_key),
+        finger_key,
+        fingers.hand,
+        fingers.finger,
+    )
+
+
+def _shift(tip: NDArray[np.float64], keys: NDArray[np.int8]) -> NDArray[np.float64]:
+    """(T, 2) what to add to one fingertip so that it presses its keys (T,)."""
+    shift = np.zeros_like(tip)
+    weight = np.zeros(len(tip))
+    edges = np.flatnonzero(np.diff(keys, prepend=NO_KEY, append=NO_KEY))
+    for first, end in pairwise(edges):
+        key = int(keys[first])
+        if key == NO_KEY:
+            continue
+        low, high = _BLACK_X if BLACK[key] else _WHITE_X
+        place = [np.clip(np.median(tip[first:end, 0]), low, high), key_centres()[key, 1]]
+        # It comes down from above its key: the frame before counts as one in which it presses.
+        first -= first > 0 and keys[first - 1] == NO_KEY
+        shift[first:end], weight[first:end] = place - tip[first:end], 1.0
+    # Before and after, less and less of it.
+    result = shift.copy()
+    pressing = np.flatnonzero(weight > 0)
+    if not len(pressing):
+        return result
+    frame = np.arange(len(tip))
+    after = np.clip(np.searchsorted(pressing, frame), 0, len(pressing) - 1)
+    before = np.clip(np.searchsorted(pressing, frame, side="right") - 1, 0, len(pressing) - 1)
+    coming, gone = pressing[after] - frame, frame - pressing[before]
+    ahead = np.where(coming >= 0, np.clip(1 - coming / _LEAD, 0, 1), 0.0)
+    behind = np.where(gone >= 0, np.clip(1 - gone / _LEAD, 0, 1), 0.0)
+    total = np.maximum(ahead + behind, 1.0)
+    idle = weight == 0
+    mixed = (
+        ahead[:, None] * shift[pressing[after]] + behind[:, None] * shift[pressing[before]]
+    ) / total[:, None]
+    result[idle] = mixed[idle]
+    return result
+
+
+def _as_in_the_paper(score: Score, points: NDArray[np.float64]) -> FingertipPlan:
+    """Appendix A, steps 3 and 4, frame by frame.
+
+    A finger on the key that is to be pressed, or else the nearest free one over the keys beside
+    it, is moved to its middle line; if there is none, nothing is done.
+    """
+    centres, half = key_centres(), key_half_sizes()
+    moved = points.copy()
+    finger_key = np.full((len(points), 2, 5), NO_KEY, np.int8)
+    roll = score.roll()
+    for frame, key in zip(*np.nonzero(roll), strict=True):
+        tips = points[frame, :, 1:]
+        free = finger_key[frame] == NO_KEY
+        beside = np.abs(tips[..., 1] - centres[key, 1])
+        front = BLACK_FRONT if BLACK[key] else FRONT
+        along = (tips[..., 0] > FAR) & (tips[..., 0] < front)
+        on_it = (beside <= half[key, 1]) & along & free
+        near = (beside <= 1.5 * WHITE_WIDTH) & free
+        wanted = on_it if on_it.any() else near
+        if not wanted.any():
+            continue
+        hand, finger = np.unravel_index(np.argmin(np.where(wanted, beside, np.inf)), beside.shape)
+        finger_key[frame, hand, finger] = key
+        moved[frame, hand, finger + 1, 1] = centres[key, 1]
+    note_hand = np.full(len(score), -1, np.int8)
+    note_finger = note_hand.copy()
+    for note, (first, end) in enumerate(score.note_frames()):
+        often = (finger_key[first:end] == score.key[note]).sum(axis=0)
+        if often.any():
+            note_hand[note], note_finger[note] = np.unravel_index(often.argmax(), often.shape)
+    return FingertipPlan(_with_height(moved, finger_key), finger_key, note_hand, note_finger)
+
+
+def _with_height(points: NDArray[np.float64], finger_key: NDArray[np.int8]) -> NDArray[np.float64]:
+    """Points (T, 2, 6, 2) with z: 0 where a finger presses, `HIGH` elsewhere."""
+    height = np.full(points.shape[:3], HIGH)
+    height[:, :, 1:][finger_key != NO_KEY] = 0.0
+    return np.concatenate((points, height[..., None]), axis=3)

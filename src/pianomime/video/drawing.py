@@ -1,0 +1,78 @@
+"""What was seen, drawn into a picture of the video."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw
+
+from pianomime.plan import LEFT, NO_KEY
+from pianomime.video.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
+from pianomime.video.plane import Plane
+from pianomime.world.figures import BLACK, KEYS, key_centres, key_half_sizes
+
+HAND_COLOURS = ((255, 176, 0), (0, 200, 255))
+"""Of the left and the right hand."""
+_LOST = (255, 60, 60)
+_GRID = (90, 255, 120)
+
+
+def key_outline(key: int) -> NDArray[np.float64]:
+    """(4, 2) world x, y [m] of a key's corners."""
+    _, y, _ = key_centres()[key]
+    half = key_half_sizes()[key, 1] if BLACK[key] else WHITE_WIDTH / 2
+    front = BLACK_FRONT if BLACK[key] else FRONT
+    return np.array([[FAR, y - half], [FAR, y + half], [front, y + half], [front, y - half]])
+
+
+class Drawing:
+    """Draws over pictures of one size, taken from one place."""
+
+    def __init__(self, plane: Plane) -> None:
+        """Prepare for pictures of which `plane` is the plane."""
+        self._plane = plane
+        self._outlines = [plane.to_pixels(key_outline(key)) for key in range(KEYS)]
+
+    def draw(
+        self,
+        picture: NDArray[np.uint8],
+        points: NDArray[np.float64],
+        found: NDArray[np.bool_],
+        finger_key: NDArray[np.int8],
+    ) -> NDArray[np.uint8]:
+        """A picture with key grid, hands, pressed keys and the number of the finger on each.
+
+        Args:
+            picture: (height, width, 3).
+            points: (2, 6, 2) world x, y [m] of both hands.
+            found: (2,) hands that were seen; the others are drawn in red.
+            finger_key: (2, 5) key that each finger presses.
+        """
+        image = Image.fromarray(picture).convert("RGB")
+        pen = ImageDraw.Draw(image, "RGBA")
+        for outline in self._outlines:
+            pen.polygon(_corners(outline), outline=(*_GRID, 90))
+        places = self._plane.to_pixels(points)
+        radius = max(3.0, picture.shape[1] / 320)
+        for hand, colour in enumerate(HAND_COLOURS):
+            for finger, key in enumerate(finger_key[hand]):
+                if key != NO_KEY:
+                    outline = self._outlines[key]
+                    pen.polygon(_corners(outline), fill=(*colour, 110), outline=(*colour, 255))
+                    foot = (outline[2] + outline[3]) / 2
+                    label = f"{'L' if hand == LEFT else 'R'}{finger + 1}"
+                    pen.text(tuple(foot), label, fill=(255, 255, 255), anchor="ms", stroke_width=1)
+            mark = colour if found[hand] else _LOST
+            wrist = tuple(places[hand, 0])
+            for finger in range(1, 6):
+                tip = places[hand, finger]
+                pen.line([wrist, tuple(tip)], fill=(*mark, 150), width=2)
+                pressing = finger_key[hand, finger - 1] != NO_KEY
+                size = radius * (1.6 if pressing else 1.0)
+                box = [tuple(tip - size), tuple(tip + size)]
+                pen.ellipse(box, fill=(*mark, 230 if pressing else 120), outline=(0, 0, 0))
+        return np.asarray(image, np.uint8)
+
+
+def _corners(outline: NDArray[np.float64]) -> list[tuple[float, float]]:
+    return [(float(x), float(y)) for x, y in outline]

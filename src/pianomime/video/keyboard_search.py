@@ -1,0 +1,266 @@
+"""Finding a keyboard in a picture by the pattern of its black keys.
+
+Lines are laid across the picture at several angles. Where one crosses black keys, the dark
+stretches on it come in groups of two and three, which gives the keyboard's scale and the place of
+every C. Many such lines side by side are a keyboard.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, maximum_filter1d, minimum_filter1d, uniform_filter1d
+
+# Where the black keys of an octave lie, in widths of a white key from the left edge of C. Makers
+# differ by a tenth either way, and simulated ones sit right on the edges of white keys.
+_BLACK_AT = np.array([0.94, 2.06, 3.92, 5.0, 6.08])
+_OFF = 0.22
+"""How far off a black key may be found [white keys]."""
+_WIDTHS = (0.25, 0.85)
+"""How wide one may look [white keys]."""
+_CONTRAST = 0.12
+"""Between black and white, at least, on a scale of 0 to 1."""
+_FEWEST = 5
+"""Black keys on a line."""
+_NARROWEST = 5
+"""White keys [pixels]."""
+_GUESSES = 8
+_LINES = 150
+_ANGLES = np.radians(np.arange(-10, 11, 2.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Where the black keys are, along lines across the picture.
+
+    A place (s, r) is `origin + s * along + r * across` [pixels]; white key edges lie at
+    s = start(r) + width(r) * u for whole u, and u = 0, 7, 14 ... are left edges of a C (or, if
+    seen in a mirror, 3 - u).
+
+    Attributes:
+        origin, along, across: (2,) column, row.
+        start, width: (2,) coefficients (at r = 0, per r) [pixels].
+        rows: first and last r that cross black keys [pixels].
+        blacks: numbers of the black keys found, counted from the black key at the right edge of
+            the C at u = 0, five to an octave.
+        score: how much speaks for it.
+    """
+
+    origin: NDArray[np.float64]
+    along: NDArray[np.float64]
+    across: NDArray[np.float64]
+    start: NDArray[np.float64]
+    width: NDArray[np.float64]
+    rows: tuple[float, float]
+    blacks: NDArray[np.int64]
+    score: float
+
+    def pixels(self, u: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(..., 2) column, row of places along the keyboard and across it."""
+        s = self.start[0] + self.start[1] * r + (self.width[0] + self.width[1] * r) * u
+        places: NDArray[np.float64] = (
+            self.origin + s[..., None] * self.along + r[..., None] * self.across
+        )
+        return places
+
+
+def black_place(number: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Places u of black keys, by the number that `Lines.blacks` gives them."""
+    return np.asarray(_BLACK_AT[number % 5] + 7 * (number // 5))
+
+
+def sample(picture: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Brightness at places (..., 2) column, row, measured from the picture's corner.
+
+    Outside the picture it is NaN.
+    """
+    at = np.moveaxis(places[..., ::-1] - 0.5, -1, 0)
+    return np.asarray(map_coordinates(picture, at, order=1, mode="constant", cval=np.nan))
+
+
+def find_lines(picture: NDArray[np.float32]) -> Lines | None:
+    """The keyboard in a grey picture (height, width), 0..1; None if there is none."""
+    best: Lines | None = None
+    for turn, angle in product((0.0, np.pi / 2), _ANGLES):
+        found = _at_angle(picture, turn + angle)
+        if found is not None and (best is None or found.score > best.score):
+            best = found
+    return best
+
+
+def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
+    height, width = picture.shape
+    along = np.array([np.cos(angle), np.sin(angle)])
+    across = np.array([-along[1], along[0]])
+    origin = np.array([width, height]) / 2
+    half_s, half_r = (float(np.abs(way) @ [width, height]) / 2 for way in (along, across))
+    s = np.arange(-half_s, half_s)
+    rows = np.linspace(-half_r, half_r, _LINES)
+    places = origin + s[None, :, None] * along + rows[:, None, None] * across
+    profiles = sample(picture, places)
+    window = max(15, len(s) // 8)
+    filled = np.nan_to_num(profiles, nan=0.0)
+    filled = uniform_filter1d(filled, 3, axis=1)
+    low = minimum_filter1d(filled, window, axis=1)
+    high = maximum_filter1d(filled, window, axis=1)
+    dark = (filled < (low + high) / 2) | (high - low < _CONTRAST)
+    fits = [_fit(mask, s) for mask in dark]
+    scores = np.array([0.0 if fit is None else fit.score for fit in fits])
+    if scores.max() < _FEWEST:
+        return None
+    good = scores >= max(_FEWEST, 0.6 * scores.max())
+    # The longest run of good lines that agree with the best of them, small holes allowed.
+    middle = int(np.argmax(uniform_filter1d(scores * good, 5)))
+    if fits[middle] is None or not good[middle]:
+        middle = int(np.argmax(scores))
+    reference = fits[middle]
+    assert reference is not None
+    members = [middle]
+    for step in (1, -1):
+        row, missed, last = middle + step, 0, reference
+        while 0 <= row < len(fits) and missed < 3:
+            fit = fits[row]
+            moved = None if fit is None or not good[row] else fit.like(last)
+            if moved is None:
+                missed += 1
+            else:
+                missed, last = 0, moved
+                fits[row] = moved
+                members.append(row)
+            row += step
+    chosen = sorted(members)
+    if len(chosen) < 3:
+        return None
+    kept = [fit for row in chosen if (fit := fits[row]) is not None]
+    r = rows[chosen]
+    start = line_through(r, np.array([fit.start for fit in kept]))
+    wide = line_through(r, np.array([fit.width for fit in kept]))
+    numbers, times = np.unique(np.concatenate([fit.blacks for fit in kept]), return_counts=True)
+    return Lines(
+        origin,
+        along,
+        across,
+        start,
+        wide,
+        (float(r[0]), float(r[-1])),
+        numbers[times >= 0.3 * len(kept)],
+        float(sum(fit.score for fit in kept)),
+    )
+
+
+def line_through(r: NDArray[np.float64], value: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2,) value at r = 0 and slope: the middle of the slopes of all pairs (Theil and Sen)."""
+    first, second = np.triu_indices(len(r), 1)
+    slope = np.median((value[second] - value[first]) / (r[second] - r[first]))
+    return np.array([np.median(value - slope * r), slope])
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """One line across the keyboard: u = (s - start) / width."""
+
+    start: float
+    width: float
+    blacks: NDArray[np.int64]
+    score: float
+
+    def like(self, other: _Fit) -> _Fit | None:
+        """The same, counted from the octave that another one is counted from."""
+        if abs(self.width / other.width - 1) > 0.03:
+            return None
+        middle = other.start + other.width * float(black_place(other.blacks).mean())
+        shift = (middle - self.start) / self.width - (middle - other.start) / other.width
+        octaves = round(shift / 7)
+        if abs(shift - 7 * octaves) > 0.4:
+            return None
+        return _Fit(
+            self.start + 7 * octaves * self.width,
+            self.width,
+            self.blacks - 5 * octaves,
+            self.score,
+        )
+
+
+def _fit(dark: NDArray[np.bool_], s: NDArray[np.float64]) -> _Fit | None:
+    """Explain the dark stretches (S,) on a line as black keys."""
+    edges = np.flatnonzero(np.diff(dark, prepend=False, append=False))
+    begin, end = edges[::2], edges[1::2]
+    centre = s[0] + (begin + end - 1) / 2
+    length = (end - begin).astype(np.float64)
+    if len(centre) < _FEWEST:
+        return None
+    # Lines between white keys are dark too, but thin.
+    broad = length > 0.35 * np.percentile(length, 75)
+    centre, length = centre[broad], length[broad]
+    if len(centre) < _FEWEST:
+        return None
+    # Two stretches, five black keys and so an octave apart, taken as each of five kinds, give scale
+    # and place. Where some between them are hidden, they are fewer.
+    guesses = []
+    for step in (5, 4, 3):
+        if len(centre) <= step:
+            continue
+        left = np.repeat(np.arange(len(centre) - step), 5)
+        kind = np.tile(np.arange(5), len(centre) - step)
+        width = (centre[left + step] - centre[left]) / 7
+        guesses.append((centre[left] - width * _BLACK_AT[kind], width, length[left] / width))
+    start, width, ratio = (np.concatenate(each) for each in zip(*guesses, strict=True))
+    sensible = (ratio > _WIDTHS[0]) & (ratio < _WIDTHS[1]) & (width > _NARROWEST)
+    if not sensible.any():
+        return None
+    start, width = start[sensible], width[sensible]
+    score, number, fits = _judge(centre, length, start, width)
+    best: _Fit | None = None
+    for guess in np.argsort(-score)[:_GUESSES]:
+        refined = _least_squares(centre, length, number[guess], fits[guess])
+        if refined is not None and (best is None or refined.score > best.score):
+            best = refined
+    return best
+
+
+def _least_squares(
+    centre: NDArray[np.float64],
+    length: NDArray[np.float64],
+    number: NDArray[np.int64],
+    fits: NDArray[np.bool_],
+) -> _Fit | None:
+    """The line through stretches that fit, those that then fit too included, and so on."""
+    best: _Fit | None = None
+    for _ in range(3):
+        if fits.sum() < _FEWEST:
+            break
+        width, start = np.polyfit(black_place(number[fits]), centre[fits], 1)
+        if not width > _NARROWEST:
+            break
+        score, numbers, fitting = _judge(centre, length, np.array([start]), np.array([width]))
+        number, fits = numbers[0], fitting[0]
+        if fits.sum() >= _FEWEST and (best is None or score[0] > best.score):
+            best = _Fit(float(start), float(width), np.unique(number[fits]), float(score[0]))
+    return best
+
+
+def _judge(
+    centre: NDArray[np.float64],
+    length: NDArray[np.float64],
+    start: NDArray[np.float64],
+    width: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Score (H,) of H hypotheses, and which black key each of N stretches is (H, N), if any."""
+    u = (centre[None] - start[:, None]) / width[:, None]
+    octave = np.floor(u / 7)
+    off = np.abs((u - 7 * octave)[..., None] - _BLACK_AT)
+    which = off.argmin(axis=2)
+    number = (5 * octave + which).astype(np.int64)
+    ratio = length[None] / width[:, None]
+    proper = (ratio > _WIDTHS[0]) & (ratio < _WIDTHS[1])
+    fits = (off.min(axis=2) < _OFF) & proper
+    count = fits.sum(axis=1)
+    lowest = np.where(fits, number, np.iinfo(np.int64).max).min(axis=1)
+    highest = np.where(fits, number, np.iinfo(np.int64).min).max(axis=1)
+    expected = np.where(count > 0, highest - lowest + 1, 0)
+    stray = (proper & ~fits).sum(axis=1)
+    score = count - 0.7 * np.abs(expected - count) - 0.7 * stray
+    return score, number, fits

@@ -1,0 +1,92 @@
+"""Notes read off the video itself: from the keys that light up, or look different when pressed."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.music import Score
+from pianomime.video.hand_tracks import HandTracks
+from pianomime.video.key_light import ZONES, glow, standing_out
+from pianomime.video.stretches import RATE
+from pianomime.video.touch import touching
+
+_TOUCHED = np.exp(-1.0)
+_SHARES = (0.5, 0.8)
+_LEVELS = (0.2, 0.35, 0.5)
+_SHORTEST = 2
+"""Frames."""
+_FALSE = 2.0
+"""How much worse a note that no finger plays is than a note that one does is good."""
+_VELOCITY = 80
+
+
+def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> tuple[Score, float]:
+    """Find the notes that agree best with the fingers.
+
+    The places where a note may show, and how strong a sign is asked for, are those that give the
+    most notes under a finger and the fewest that no finger can have played.
+
+    Args:
+        light: (T, zones, 88, 3), see `KeyLight`.
+        tracks: the hands.
+        title: of the score.
+
+    Returns:
+        The score, without pedal, and the share of its notes that a finger is on.
+    """
+    near = touching(tracks.points) > _TOUCHED
+    best: tuple[float, NDArray[np.int64]] = (0.0, np.zeros((0, 3), np.int64))
+    for zone, colourful in product(range(len(ZONES)), (True, False)):
+        shine = glow(light, zone, colourful)
+        for share in _SHARES:
+            stands = standing_out(shine, share)
+            for level in _LEVELS:
+                notes = _runs(stands, level)
+                worth = _worth(notes, near)
+                if worth > best[0]:
+                    best = worth, notes
+    notes = best[1]
+    touched = _touched(notes, near)
+    score = Score(
+        key=notes[:, 0],
+        onset=notes[:, 1] / RATE,
+        offset=notes[:, 2] / RATE,
+        velocity=np.full(len(notes), _VELOCITY),
+        title=title,
+    )
+    return score, float(touched.mean()) if len(notes) else 0.0
+
+
+def _runs(stands: NDArray[np.float32], level: float) -> NDArray[np.int64]:
+    """(N, 3) key, first frame and end of what rises above a level, down to half of it."""
+    notes = []
+    for key in range(stands.shape[1]):
+        value = stands[:, key]
+        lit = np.concatenate(([False], value > level / 2, [False]))
+        edges = np.flatnonzero(np.diff(lit.astype(np.int8)))
+        for first, end in edges.reshape(-1, 2).tolist():
+            if end - first < _SHORTEST or value[first:end].max() <= level:
+                continue
+            # It begins when it is bright, not when the glow of what comes begins.
+            bright = first + int(np.argmax(value[first:end] > level))
+            notes.append((key, bright, end))
+    return np.array(notes, np.int64).reshape(-1, 3)
+
+
+def _touched(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) whether a finger is on the key within a frame of the onset."""
+    key, first = notes[:, 0], notes[:, 1]
+    around = [np.clip(first + step, 0, len(near) - 1) for step in (-1, 0, 1, 2)]
+    return np.asarray(np.any([near[frame, key] for frame in around], axis=0))
+
+
+def _worth(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> float:
+    touched = _touched(notes, near)
+    # Glow that spills over looks like a note beside a note at the same time.
+    order = np.lexsort((notes[:, 1], notes[:, 0]))
+    at = {(key, first) for key, first, _ in notes[order].tolist()}
+    spilt = sum((key + 1, first + late) in at for key, first in at for late in (-1, 0, 1))
+    return float(touched.sum() - _FALSE * (~touched).sum() - _FALSE * spilt)

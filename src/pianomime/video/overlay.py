@@ -1,0 +1,60 @@
+"""The video with what was seen drawn into it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+
+from pianomime.files import atomic
+from pianomime.plan import NO_KEY
+from pianomime.video.drawing import Drawing
+from pianomime.video.retarget import Retargeted
+from pianomime.video.stretches import RATE
+
+
+def write_overlay(
+    made: Retargeted, path: Path, tell: Callable[[str, int, int], None] | None = None
+) -> None:
+    """Film the landmarks, the key grid, the pressed keys and the fingering, 20 frames a second.
+
+    Args:
+        made: what was made of a video.
+        path: MP4 file; appears only when complete.
+        tell: told the stage, the frames done and the frames in all.
+    """
+    drawing = Drawing(made.plane)
+    finger_key = made.demonstration.plan.finger_key
+    nothing = np.full((2, 5), NO_KEY, np.int8)
+    tracks = made.tracks
+    with (
+        atomic(path) as temporary,
+        av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as film,
+    ):
+        stream: Any = None
+        for number, frame in enumerate(made.film.frames(RATE)):
+            if number >= len(tracks):
+                break
+            drawn = drawing.draw(
+                frame.picture,
+                tracks.points[number],
+                tracks.found[number],
+                finger_key[number] if number < len(finger_key) else nothing,
+            )
+            # H.264 wants even sizes.
+            drawn = drawn[: drawn.shape[0] // 2 * 2, : drawn.shape[1] // 2 * 2]
+            if stream is None:
+                stream = film.add_stream("libx264", rate=round(RATE))
+                stream.height, stream.width = drawn.shape[:2]
+                stream.pix_fmt = "yuv420p"
+                stream.options = {"crf": "23", "preset": "veryfast"}
+            picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(drawn), format="rgb24")
+            picture.pts, picture.time_base = number, Fraction(1, round(RATE))
+            film.mux(stream.encode(picture))
+            if tell is not None:
+                tell("overlay", number + 1, len(tracks))
+        film.mux(stream.encode(None))

@@ -1,0 +1,215 @@
+"""Demonstrations from the data that the PianoMime authors published, and from arrays like them.
+
+Known faults are repaired: points that were never seen and stand where the robot rests (z above
+0.1), an older convention for z of pressing fingers, presses that were left over when a hand was not
+found, fingers that press keys nobody asked for, and jumps of single frames.
+"""
+
+from __future__ import annotations
+
+import importlib
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.music import KEYS, Score
+from pianomime.plan import NO_KEY, FingertipPlan
+from pianomime.video.align import HIGH
+from pianomime.video.demonstration import Demonstration, on_grid
+from pianomime.world.figures import key_centres
+
+_RATE = 20.0
+_ON_KEY = 0.005
+"""[m] along the keyboard from the middle of a key, within which a finger at z = 0 presses it."""
+_NEVER_SEEN = 0.1
+"""[m] z from which a point stands where the robot rests."""
+_JUMP = 0.10
+"""[m] A point this far from where the frames before and after have it was seen wrongly."""
+_TIPS = 36
+
+
+def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demonstration, int]]:
+    """Demonstrations of a data set, one after the other, and how many there are.
+
+    Args:
+        source: a folder with a zarr data set, or an .npz file.
+        most: of them at most.
+
+    Raises:
+        InputError: the data are not of a kind that is known.
+    """
+    clips = _zarr(source) if source.is_dir() else _npz(source)
+    names = [f"{source.stem}-{number:03d}" for number in range(len(clips))]
+    if len(clips) == 1:
+        names = [source.stem]
+    total = len(clips) if most is None else min(most, len(clips))
+    for (tips, goal), name in zip(clips[:total], names, strict=False):
+        yield demonstration_of(tips, goal, name, source.name), total
+
+
+def demonstration_of(
+    fingertips: NDArray[np.float64], goal: NDArray[np.bool_] | None, title: str, source: str
+) -> Demonstration:
+    """A demonstration of arrays as PianoMime makes them.
+
+    Args:
+        fingertips: (T, 2, 6, 3) world [m], hands (left, right).
+        goal: (T, 88) keys that should be down; None if only the fingers tell.
+        title: of the piece.
+        source: where it is from.
+    """
+    tips, mended = _mend(np.asarray(fingertips, np.float64))
+    pressing = _pressed(tips)
+    stale = 0
+    if goal is None:
+        down = np.zeros((len(tips), KEYS), bool)
+        frame, hand, finger = np.nonzero(pressing >= 0)
+        down[frame, pressing[frame, hand, finger]] = True
+    else:
+        down = np.asarray(goal, bool)
+        asked = np.take_along_axis(down, np.maximum(pressing, 0).reshape(len(tips), -1), axis=1)
+        wrong = (pressing >= 0) & ~asked.reshape(pressing.shape)
+        stale = int(wrong.sum())
+        pressing[wrong] = NO_KEY
+    score = on_grid(Score.from_roll(down, title=title))
+    frames = score.frames()
+    rows = np.minimum(np.arange(frames), len(tips) - 1)
+    finger_key = pressing[rows].astype(np.int8)
+    finger_key[len(tips) :] = NO_KEY
+    roll = score.roll()
+    # Keys that are due but that no finger presses: the one that presses them before or after.
+    note_hand = np.full(len(score), -1, np.int8)
+    note_finger = note_hand.copy()
+    for note, (first, end) in enumerate(score.note_frames()):
+        often = (finger_key[first:end] == score.key[note]).sum(axis=0)
+        if not often.any():
+            continue
+        hand, finger = np.unravel_index(often.argmax(), often.shape)
+        note_hand[note], note_finger[note] = hand, finger
+        mine = finger_key[first:end, hand, finger]
+        mine[mine == NO_KEY] = score.key[note]
+    finger_key[
+        ~np.take_along_axis(
+            roll, np.maximum(finger_key, 0).reshape(frames, -1).astype(np.int64), axis=1
+        ).reshape(finger_key.shape)
+    ] = NO_KEY
+    points = tips[rows].copy()
+    points[..., 2] = HIGH
+    frame, hand, finger = np.nonzero(finger_key >= 0)
+    points[frame, hand, finger + 1, 1] = key_centres()[finger_key[frame, hand, finger], 1]
+    points[frame, hand, finger + 1, 2] = 0.0
+    return Demonstration(
+        score,
+        FingertipPlan(points, finger_key, note_hand, note_finger),
+        source,
+        quality={
+            "notes": len(score),
+            "notes_without_finger": int((note_hand < 0).sum()),
+            "points_mended": int(mended),
+            "stale_presses": stale,
+        },
+    )
+
+
+def _mend(tips: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """The points with those that were never seen, or seen wrongly, put between their neighbours."""
+    if tips.ndim != 4 or tips.shape[1:] != (2, 6, 3) or not len(tips):
+        raise InputError(f"fingertips must be (T, 2, 6, 3), not {tips.shape}")
+    bad = ~np.isfinite(tips).all(axis=3) | (tips[..., 2] > _NEVER_SEEN)
+    flat = tips[..., :2]
+    if len(tips) >= 3:
+        between = (flat[:-2] + flat[2:]) / 2
+        off = np.linalg.norm(flat[1:-1] - between, axis=3)
+        bad[1:-1] |= off > _JUMP + np.linalg.norm(flat[2:] - flat[:-2], axis=3)
+    # A finger that presses is where its key is.
+    bad &= tips[..., 2] != 0.0
+    mended = tips.copy()
+    time = np.arange(len(tips))
+    for hand, point in np.ndindex(2, 6):
+        wrong = bad[:, hand, point]
+        if wrong.any() and not wrong.all():
+            for axis in range(2):
+                mended[wrong, hand, point, axis] = np.interp(
+                    time[wrong], time[~wrong], tips[~wrong, hand, point, axis]
+                )
+    return mended, int(bad.sum())
+
+
+def _pressed(tips: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(T, 2, 5) the key under each finger whose z says that it presses, -1 for none."""
+    height = tips[:, :, 1:, 2]
+    low = height <= 0.001
+    if not low.any():
+        # Two of the clips have a pressing finger at the middle of its key's box.
+        low = height < 0.03
+    off = np.abs(tips[:, :, 1:, 1, None] - key_centres()[:, 1])
+    nearest = off.argmin(axis=3)
+    return np.where(low & (off.min(axis=3) < _ON_KEY), nearest, NO_KEY)
+
+
+_Clip = tuple[NDArray[np.float64], NDArray[np.bool_] | None]
+
+
+def _npz(path: Path) -> list[_Clip]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+    except FileNotFoundError:
+        raise InputError(f"{path}: does not exist") from None
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not an .npz file of arrays ({error})") from error
+    if "fingertips" not in arrays:
+        raise InputError(f"{path}: holds no fingertips")
+    tips = arrays["fingertips"]
+    if "goal_packed" in arrays:
+        unpacked = np.unpackbits(arrays["goal_packed"], axis=1)[:, :KEYS]
+        goal: NDArray[np.bool_] | None = unpacked.astype(bool)
+    else:
+        goal = arrays.get("goal")
+    if goal is not None and goal.shape != (len(tips), KEYS):
+        raise InputError(f"{path}: goals must be ({len(tips)}, {KEYS}), not {goal.shape}")
+    length = arrays.get("length", np.array([len(tips)]))
+    if int(length.sum()) != len(tips):
+        raise InputError(f"{path}: the lengths of the clips do not add up to {len(tips)} frames")
+    ends = np.cumsum(length)
+    return [
+        (tips[end - frames : end], None if goal is None else goal[end - frames : end])
+        for end, frames in zip(ends, length, strict=True)
+    ]
+
+
+def _zarr(folder: Path) -> list[_Clip]:
+    """The high-level data set: state (N, 212) and action (N, 184), ends of clips inclusive."""
+    try:
+        zarr: Any = importlib.import_module("zarr")
+    except ImportError as error:
+        raise InputError(
+            f"{folder}: reading it needs the package zarr: pip install zarr"
+        ) from error
+    try:
+        root = zarr.open(str(folder), mode="r")
+        group, meta = (root.get(name, root) for name in ("data", "meta"))
+        # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers.
+        action = np.asarray(group["action"])
+        ends = np.asarray(meta["episode_ends"]).astype(np.int64)
+    except (KeyError, ValueError, OSError, TypeError) as error:
+        raise InputError(f"{folder}: not PianoMime's high-level data set ({error})") from error
+    if action.ndim != 2 or action.shape[1] < _TIPS + 10:
+        raise InputError(f"{folder}: not PianoMime's high-level data set")
+    clips: list[_Clip] = []
+    first = 0
+    for end in ends:
+        rows = action[first : end + 1]
+        first = int(end) + 1
+        tips = rows[:, :_TIPS].reshape(-1, 2, 6, 3).astype(np.float64)
+        keys = np.rint(rows[:, _TIPS : _TIPS + 10] * 89).astype(np.int64) - 1
+        goal = np.zeros((len(rows), KEYS), bool)
+        frame, _ = np.nonzero((keys >= 0) & (keys < KEYS))
+        goal[frame, keys[(keys >= 0) & (keys < KEYS)]] = True
+        clips.append((tips, goal))
+    return clips

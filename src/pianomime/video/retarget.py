@@ -1,0 +1,307 @@
+"""From a video to a Demonstration: keyboard, hands, notes, fingers, fingertips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.music import Score
+from pianomime.plan import LEFT
+from pianomime.video.align import Rule, align
+from pianomime.video.demonstration import Demonstration, on_grid
+from pianomime.video.film import Film
+from pianomime.video.hand_detector import HandDetector, Sighting
+from pianomime.video.hand_model import find_hand_model
+from pianomime.video.hand_tracks import HandTracks, follow, poorly_seen
+from pianomime.video.key_light import ZONES, KeyLight
+from pianomime.video.keyboard import find_keyboards, key_name
+from pianomime.video.midi_offset import Offset, estimate_offset
+from pianomime.video.note_fingers import NoteFingers, find_note_fingers
+from pianomime.video.note_reading import read_notes
+from pianomime.video.parallax import without_parallax
+from pianomime.video.plane import Plane
+from pianomime.video.points import read_points
+from pianomime.video.stretches import RATE, stretches
+
+Tell = Callable[[str, int, int], None]
+
+_BACKGROUND_FRAMES = 25
+_FEWEST_HANDS = 0.05
+"""Share of the frames in which a hand must be seen for the video to be one of playing."""
+_TOO_FEW_TOUCHED = 0.5
+"""Share of a MIDI file's notes with a finger on their key below which it is of another song."""
+_FEW_TOUCHED = 0.7
+"""Share of notes with a finger on their key below which notes read off a video are doubtful."""
+
+
+@dataclass(frozen=True)
+class RetargetConfig:
+    """How to make a demonstration of a video."""
+
+    midi: Path | None = None
+    """What is played; read off the video if not given."""
+    points: Path | None = None
+    """JSON of named points of the keyboard; found by itself if not given."""
+    offset: float | None = None
+    """When in the video the MIDI file begins [s]; estimated if not given."""
+    hand_model: Path | None = None
+    """MediaPipe's hand_landmarker.task; downloaded once if not given."""
+    align: Rule = "steady"
+    """How fingertips are put on keys."""
+
+
+@dataclass(frozen=True, eq=False)
+class Retargeted:
+    """A demonstration, and what a picture of how it was made needs.
+
+    Attributes:
+        demonstration: the result.
+        film: the video.
+        plane: from its pixels to the world.
+        tracks: the hands, as they were seen and repaired.
+        fingers: who played each note.
+        remarks: what a person should know, one line each.
+    """
+
+    demonstration: Demonstration
+    film: Film
+    plane: Plane
+    tracks: HandTracks
+    fingers: NoteFingers
+    remarks: list[str]
+
+
+def retarget(
+    video: Path, config: RetargetConfig | None = None, tell: Tell | None = None
+) -> Retargeted:
+    """Make a demonstration of a video.
+
+    Args:
+        video: any video of a keyboard from above.
+        config: what else is known.
+        tell: told the stage, the steps done and the steps in all (0: unknown).
+
+    Raises:
+        InputError: a file is not what it should be, or the video shows no keyboard, or no hands.
+    """
+    config = config or RetargetConfig()
+    tell = tell or (lambda stage, done, total: None)
+    # What can be wrong is looked at before what takes long.
+    score = None if config.midi is None else Score.from_midi(config.midi)
+    film = Film(video)
+    model = find_hand_model(config.hand_model)
+    remarks: list[str] = []
+    tell("keyboard", 0, 0)
+    background = _background(film)
+    if config.points is None:
+        ways = find_keyboards(background)
+        if not ways:
+            raise InputError(
+                f"{video}: no keyboard found; show where it is with `pianomime pick {video}`"
+            )
+        seen = ways[0].describe()
+        planes = [way.plane for way in ways]
+    else:
+        named = read_points(config.points)
+        seen = named.describe()
+        planes = [named.plane.zoomed(1 / film.zoom)]
+        ways = []
+    watched = _watch(film, planes, model, tell)
+    tell("notes", 0, 0)
+    best, tracks, offset = _best_way(watched, planes, score, config.offset)
+    plane, light = planes[best], watched.light[best]
+    if ways:
+        seen = ways[best].describe()
+        if len(ways) > 1 and offset is None:
+            lowest = key_name(int(np.flatnonzero(ways[best].seen)[0]))
+            remarks.append(
+                f"the video does not tell the octave: the lowest key seen is taken for {lowest} "
+                "(a MIDI file would tell)"
+            )
+    _check_hands(video, tracks, remarks)
+    remarks += _hidden(light)
+    score, facts = _score(film, score, offset, tracks, light, config, remarks)
+    frames = score.frames()
+    points = _rows(tracks.points, frames)
+    fingers = find_note_fingers(score, points)
+    straight = without_parallax(points, score, fingers)
+    fingers = find_note_fingers(score, straight.points)
+    plan = align(score, straight.points, fingers, config.align)
+    if fingers.guessed.any():
+        remarks.append(
+            f"{int(fingers.guessed.sum())} of {len(score)} notes have no finger near their key: "
+            "theirs is a guess"
+        )
+    for first, end, hand in poorly_seen(tracks):
+        which = "left" if hand == LEFT else "right"
+        remarks.append(f"the {which} hand is not seen from {first:.1f} s to {end:.1f} s")
+    found = tracks.found
+    quality: dict[str, Any] = {
+        "keyboard": seen,
+        "seconds": len(tracks) / RATE,
+        "both_hands_found": round(float(found.all(axis=1).mean()), 4),
+        "left_hand_found": round(float(found[:, 0].mean()), 4),
+        "right_hand_found": round(float(found[:, 1].mean()), 4),
+        "points_mended": round(float(tracks.mended.mean()), 4),
+        "ghost_hands": tracks.ghosts,
+        "left_right_swaps": tracks.swaps,
+        "notes": len(score),
+        "notes_guessed": int(fingers.guessed.sum()),
+        "parallax_millimetres": round(straight.millimetres, 2),
+        "align": config.align,
+        **facts,
+        "remarks": remarks,
+    }
+    demonstration = Demonstration(score, plan, video.name, plane.zoomed(film.zoom).matrix, quality)
+    return Retargeted(demonstration, film, plane, tracks, fingers, remarks)
+
+
+def _background(film: Film) -> NDArray[np.float32]:
+    """The grey picture (height, width), 0..1, that stays when hands and lights come and go."""
+    pictures = film.sample(_BACKGROUND_FRAMES)
+    if not pictures:
+        raise InputError(f"{film.path}: no picture in it can be read")
+    grey = np.stack([picture.mean(axis=2, dtype=np.float32) for picture in pictures])
+    return np.asarray(np.median(grey, axis=0) / 255, np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched:
+    """What one pass over the film gave.
+
+    Attributes:
+        sightings: hands in each frame.
+        light: for each plane, (T, zones, 88, 3), see `KeyLight`.
+        size: width and height of the pictures [pixels].
+    """
+
+    sightings: list[list[Sighting]]
+    light: list[NDArray[np.uint8]]
+    size: tuple[int, int]
+
+
+def _watch(film: Film, planes: list[Plane], model: Path, tell: Tell) -> _Watched:
+    size = (round(film.width / film.zoom), round(film.height / film.zoom))
+    readers = [KeyLight(plane, size) for plane in planes]
+    sightings: list[list[Sighting]] = []
+    light: list[list[NDArray[np.uint8]]] = [[] for _ in planes]
+    total = round(film.seconds * RATE)
+    with HandDetector(model) as detector:
+        for number, frame in enumerate(film.frames(RATE)):
+            sightings.append(detector.detect(frame.picture, round(number * 1000 / RATE)))
+            for reader, kept in zip(readers, light, strict=True):
+                kept.append(reader.read(frame.picture))
+            tell("hands", number + 1, max(total, number + 1))
+    return _Watched(sightings, [np.array(kept) for kept in light], size)
+
+
+def _best_way(
+    watched: _Watched, planes: list[Plane], score: Score | None, given: float | None
+) -> tuple[int, HandTracks, Offset | None]:
+    """The plane under which the notes of the score, if there is one, are most under fingers."""
+    best: tuple[int, HandTracks, Offset | None] | None = None
+    for number, plane in enumerate(planes):
+        tracks = follow(watched.sightings, watched.size, plane)
+        if score is None:
+            return number, tracks, None
+        offset = estimate_offset(score, tracks, watched.light[number], given)
+        if best is None or best[2] is None or offset.touched > best[2].touched + 0.02:
+            best = number, tracks, offset
+    assert best is not None
+    return best
+
+
+def _check_hands(video: Path, tracks: HandTracks, remarks: list[str]) -> None:
+    share = tracks.found.mean(axis=0)
+    if share.max(initial=0.0) < _FEWEST_HANDS:
+        raise InputError(f"{video}: no hands are seen playing")
+    for hand, name in ((0, "left"), (1, "right")):
+        if share[hand] < _FEWEST_HANDS:
+            remarks.append(f"only one hand is seen: the {name} one is made up, at rest")
+
+
+def _hidden(light: NDArray[np.uint8]) -> list[str]:
+    """Remarks on when the keyboard does not look like itself: after a cut, or a move."""
+    level = light[:, list(ZONES).index("far end")].mean(axis=2)
+    usual = np.median(level[:: max(1, len(level) // 2000)], axis=0)
+    usual = usual - usual.mean()
+    level = level - level.mean(axis=1, keepdims=True)
+    likeness = level @ usual / (np.linalg.norm(level, axis=1) * np.linalg.norm(usual) + 1e-9)
+    return [
+        f"the keyboard is not where it was, or hidden, from {first:.1f} s to {end:.1f} s"
+        for first, end in stretches(likeness < 0.5)
+    ]
+
+
+def _score(
+    film: Film,
+    score: Score | None,
+    offset: Offset | None,
+    tracks: HandTracks,
+    light: NDArray[np.uint8],
+    config: RetargetConfig,
+    remarks: list[str],
+) -> tuple[Score, dict[str, Any]]:
+    """What is played, timed by the video, and figures about it."""
+    seconds = len(tracks) / RATE
+    if score is None or offset is None:
+        read, touched = read_notes(light, tracks, film.path.stem)
+        if not len(read):
+            raise InputError(
+                f"{film.path}: no keys are seen going down or lighting up; name what is played "
+                "with --midi"
+            )
+        if touched < _FEW_TOUCHED:
+            remarks.append(
+                f"the notes are read off the video and doubtful: {touched:.0%} have a finger on "
+                "their key"
+            )
+        return on_grid(read), {"notes_from": "video", "notes_touched": round(touched, 4)}
+    if config.offset is None and offset.touched < _TOO_FEW_TOUCHED:
+        raise InputError(
+            f"{config.midi} is not what is played in {film.path}: at best {offset.touched:.0%} of "
+            "its notes have a finger on their key (--offset makes me go on all the same)"
+        )
+    if not offset.matches:
+        remarks.append(
+            f"{config.midi} may not be what is played: {offset.touched:.0%} of its notes have a "
+            f"finger on their key, {offset.by_chance:.0%} would by chance"
+        )
+    begin, end = -offset.seconds, seconds - offset.seconds
+    if end <= score.onset[0] or begin >= score.duration:
+        raise InputError(f"{config.midi}: no note falls within {film.path} at this offset")
+    early = int((score.onset < begin - 0.1).sum())
+    late = int((score.onset >= end).sum())
+    if early:
+        remarks.append(f"{early} notes of the MIDI file come before the video begins")
+    if late:
+        remarks.append(f"{late} notes of the MIDI file come after the video ends")
+    if seconds > score.duration + offset.seconds + 2:
+        remarks.append(
+            f"the video goes on for {seconds - score.duration - offset.seconds:.1f} s after the "
+            "MIDI file's last note"
+        )
+    if begin > 0:
+        timed = score.clip(begin, end)
+    else:
+        cut = score.clip(0.0, end)
+        timed = replace(
+            cut, onset=cut.onset - begin, offset=cut.offset - begin, pedal=cut.pedal - begin
+        )
+    return on_grid(timed), {
+        "notes_from": str(config.midi),
+        "offset_seconds": round(offset.seconds, 4),
+        "notes_touched": round(offset.touched, 4),
+        "notes_touched_by_chance": round(offset.by_chance, 4),
+    }
+
+
+def _rows(points: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
+    """As many rows as frames: the last one is held, or what is too much left out."""
+    return points[np.minimum(np.arange(frames), len(points) - 1)]

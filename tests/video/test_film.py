@@ -1,0 +1,77 @@
+from __future__ import annotations
+
+import wave
+
+import av
+import made_up_video as made_up
+import numpy as np
+import pytest
+
+from pianomime.errors import InputError
+from pianomime.video.film import Film
+
+
+def clock(path, shown, size=(64, 48)):
+    """A video whose brightness tells the time."""
+    with av.open(str(path), "w") as film:
+        stream = film.add_stream("libx264", rate=60)
+        stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+        stream.time_base = stream.codec_context.time_base = made_up.Fraction(1, 6000)
+        stream.options = {"crf": "10"}
+        for at in shown:
+            level = np.full((size[1], size[0], 3), 20 + round(50 * at), np.uint8)
+            frame = av.VideoFrame.from_ndarray(level, format="rgb24")
+            frame.pts, frame.time_base = round(at * 6000), made_up.Fraction(1, 6000)
+            film.mux(stream.encode(frame))
+        film.mux(stream.encode(None))
+    return path
+
+
+@pytest.mark.parametrize(("fps", "seed"), [(24, None), (30, None), (60, None), (30, 3)])
+def test_steady_rate_from_any_rate(tmp_path, fps, seed):
+    shown = made_up.times(3.0, fps, seed)
+    film = Film(clock(tmp_path / "clock.mp4", shown))
+    frames = list(film.frames(20))
+    due = np.arange(len(frames)) / 20
+    assert abs(len(frames) - 20 * shown[-1]) <= 2
+    nearest = shown[np.abs(shown[None] - due[:, None]).argmin(axis=1)]
+    told = np.array([frame.seconds for frame in frames])
+    np.testing.assert_allclose(np.abs(told - due), np.abs(nearest - due), atol=1e-3)
+    level = np.array([frame.picture.mean() for frame in frames])
+    np.testing.assert_allclose(level, 20 + 50 * told, atol=4)
+
+
+def test_large_pictures_are_shrunk(tmp_path):
+    film = Film(clock(tmp_path / "large.mp4", [0, 0.05, 0.1], (2560, 1440)))
+    assert (film.width, film.height, film.zoom) == (2560, 1440, 2.0)
+    assert next(film.frames(20)).picture.shape == (720, 1280, 3)
+
+
+def test_samples_are_from_all_over(tmp_path):
+    film = Film(clock(tmp_path / "clock.mp4", made_up.times(4.0, 30)))
+    level = [picture.mean() for picture in film.sample(12)]
+    assert len(level) == 12
+    assert len(np.unique(np.round(level))) > 3
+
+
+def test_damaged_end_is_left_out(tmp_path):
+    whole = clock(tmp_path / "whole.mkv", made_up.times(4.0, 30))
+    cut = tmp_path / "cut.mkv"
+    cut.write_bytes(whole.read_bytes()[: int(0.6 * whole.stat().st_size)])
+    assert 5 < len(list(Film(cut).frames(20))) < 80
+
+
+def test_what_is_no_video(tmp_path):
+    text = tmp_path / "text.mp4"
+    text.write_text("not a video")
+    sound = tmp_path / "sound.wav"
+    with wave.open(str(sound), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(8000)
+        file.writeframes(bytes(16000))
+    for path, why in ((text, "not a video"), (sound, "no pictures"), (tmp_path, "folder")):
+        with pytest.raises(InputError, match=why):
+            Film(path)
+    with pytest.raises(InputError, match="does not exist"):
+        Film(tmp_path / "nowhere.mp4")

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import made_up_video as made_up
+import numpy as np
+import pytest
+
+from pianomime.music import Score, onset_f1
+from pianomime.plan import NO_KEY
+from pianomime.video.align import align
+from pianomime.video.hand_tracks import HandTracks
+from pianomime.video.midi_offset import estimate_offset
+from pianomime.video.note_fingers import find_note_fingers
+from pianomime.video.note_reading import read_notes
+from pianomime.video.parallax import without_parallax
+from pianomime.world.figures import key_centres
+
+DARK = 40
+
+
+@pytest.fixture(scope="module")
+def score():
+    return made_up.song(8.0)
+
+
+@pytest.fixture(scope="module")
+def plan(score):
+    return made_up.plan_of(score)
+
+
+@pytest.fixture(scope="module")
+def points(plan):
+    return plan.fingertips[..., :2]
+
+
+def tracks(points):
+    shape = points.shape
+    return HandTracks(points, np.ones(shape[:2], bool), np.zeros(shape[:3], bool), 0, 0)
+
+
+def lamps(score, frames, spill=0.6, late=0):
+    """(T, 2, 88, 3): keys light up in the first zone, and their neighbours a little."""
+    light = np.full((frames, 2, 88, 3), DARK, float)
+    for key, onset, offset in zip(score.key, score.onset, score.offset, strict=True):
+        first, end = int(onset * 20) + late, int(np.ceil(offset * 20)) + late
+        for near, share in ((key, 1.0), (key - 1, spill), (key + 1, spill)):
+            now = light[first:end, 0, near]
+            light[first:end, 0, near] = np.maximum(now, DARK + share * np.array([0, 90, 200]))
+    light += np.random.default_rng(0).normal(0, 2, light.shape)
+    return np.clip(light, 0, 255).astype(np.uint8)
+
+
+def test_notes_are_read_off_light_that_spills(score, points):
+    read, touched = read_notes(lamps(score, len(points)), tracks(points), "read")
+    assert onset_f1((score.key, score.onset), (read.key, read.onset), 0.1) > 0.97
+    assert touched > 0.9
+    assert read.title == "read"
+
+
+def test_nothing_is_read_off_noise(points):
+    light = np.random.default_rng(0).integers(38, 42, (len(points), 2, 88, 3)).astype(np.uint8)
+    read, touched = read_notes(light, tracks(points), "noise")
+    assert len(read) < 5 or touched < 0.7
+
+
+@pytest.mark.parametrize("late", [-1.5, 0.0, 2.0])
+def test_offset_from_fingers_and_light(score, points, late):
+    """The music begins before the video, with it, or after it."""
+    if late < 0:
+        first = round(-20 * late)
+        seen, light = points[first:], lamps(score, len(points))[first:]
+    else:
+        pad = np.repeat(points[:1], round(20 * late), axis=0)
+        seen = np.concatenate((pad, points))
+        moved = Score(score.key, score.onset + late, score.offset + late, score.velocity)
+        light = lamps(moved, len(seen))
+    dark = np.full_like(light, DARK)
+    by_fingers = estimate_offset(score, tracks(seen), dark)
+    # Fingers are over their keys for a while before and after.
+    assert by_fingers.seconds == pytest.approx(late, abs=0.3)
+    assert by_fingers.matches
+    assert estimate_offset(score, tracks(seen), light).seconds == pytest.approx(late, abs=0.051)
+
+
+def test_another_song_does_not_match(points):
+    draw = np.random.default_rng(5)
+    onset = np.sort(draw.uniform(0, 7, 60))
+    other = Score(draw.integers(10, 70, 60), onset, onset + 0.2, np.full(60, 80))
+    dark = np.full((len(points), 2, 88, 3), DARK, np.uint8)
+    assert not estimate_offset(other, tracks(points), dark).matches
+
+
+def test_fingers_are_those_that_were_there(score, plan, points):
+    noisy = points + np.random.default_rng(0).normal(0, 0.002, points.shape)
+    found = find_note_fingers(score, noisy)
+    played = plan.note_hand >= 0
+    same = (found.hand == plan.note_hand) & (found.finger == plan.note_finger)
+    assert same[played].mean() > 0.97
+    assert not found.guessed[played].any()
+
+
+def test_no_finger_plays_two_keys_at_once(points):
+    chord = Score([40, 41, 42, 43, 44, 45], [1.0] * 6, [2.0] * 6, [80] * 6)
+    found = find_note_fingers(chord, points[:41])
+    assert len(set(zip(found.hand.tolist(), found.finger.tolist(), strict=True))) == 6
+
+
+def test_steady_alignment(score, points):
+    fingers = find_note_fingers(score, points)
+    plan = align(score, points, fingers)
+    frame, hand, finger = np.nonzero(plan.finger_key != NO_KEY)
+    tips = plan.fingertips[frame, hand, finger + 1]
+    keys = plan.finger_key[frame, hand, finger]
+    np.testing.assert_allclose(tips[:, 1], key_centres()[keys, 1], atol=1e-9)
+    assert (tips[:, 2] == 0).all()
+    # No finger slides on its key.
+    held = (plan.finger_key[1:] == plan.finger_key[:-1]) & (plan.finger_key[1:] != NO_KEY)
+    step = np.abs(np.diff(plan.fingertips[:, :, 1:], axis=0))
+    assert step[held].max() < 1e-9
+    # And far from any note the human is left alone.
+    assert np.abs(plan.fingertips[0, :, :, :2] - points[0]).max() < 1e-9
+    np.testing.assert_array_equal(plan.keys() & ~score.roll(), False)
+
+
+def test_parallax_is_taken_back(score, points):
+    bent = points.copy()
+    bent[..., 1] = 1.03 * bent[..., 1] + 0.003
+    fingers = find_note_fingers(score, points)
+    straight = without_parallax(bent, score, fingers)
+    before = np.abs(bent - points)[..., 1].mean()
+    assert np.abs(straight.points - points)[..., 1].mean() < 0.6 * before

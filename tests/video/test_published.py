@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import made_up_video as made_up
+import numpy as np
+import pytest
+
+from pianomime import cli
+from pianomime.errors import InputError
+from pianomime.plan import NO_KEY
+from pianomime.video.demonstration import Demonstration
+from pianomime.video.published import demonstration_of, read_published
+from pianomime.world.figures import key_centres
+
+
+@pytest.fixture(scope="module")
+def clip():
+    """Fingertips and goals as PianoMime makes them."""
+    score = made_up.song(4.0)
+    plan = made_up.plan_of(score)
+    tips = plan.fingertips.copy()
+    tips[..., 2] = 0.045
+    frame, hand, finger = np.nonzero(plan.finger_key >= 0)
+    key = plan.finger_key[frame, hand, finger]
+    tips[frame, hand, finger + 1, 1] = key_centres()[key, 1]
+    tips[frame, hand, finger + 1, 2] = 0.0
+    return tips, plan.keys(), plan.finger_key
+
+
+def test_a_clean_clip_comes_through(clip):
+    tips, goal, finger_key = clip
+    made = demonstration_of(tips, goal, "a", "data")
+    np.testing.assert_array_equal(made.score.roll()[: len(goal)], goal)
+    np.testing.assert_array_equal(made.plan.finger_key[: len(goal)], finger_key)
+    np.testing.assert_allclose(made.plan.fingertips[: len(goal)], tips, atol=1e-9)
+    assert made.quality["points_mended"] == made.quality["stale_presses"] == 0
+
+
+def test_faults_are_repaired(clip):
+    tips, goal, finger_key = clip
+    faulty = tips.copy()
+    idle = np.flatnonzero((finger_key[:, 0] == NO_KEY).all(axis=1))[0]
+    faulty[idle, 0, 2] = [0.0, key_centres()[70, 1], 0.0]  # a press that is left over
+    faulty[10:13, 1, 0] = [0.19, 0.15, 0.12]  # the robot's rest pose
+    made = demonstration_of(faulty, goal, "a", "data")
+    assert not made.plan.keys()[:, 70].any()
+    assert made.quality["stale_presses"] == 1
+    assert made.quality["points_mended"] == 3
+    np.testing.assert_allclose(made.plan.fingertips[10:13, 1, 0], tips[10:13, 1, 0], atol=0.02)
+    assert (made.plan.fingertips[..., 2] < 0.1).all()
+
+
+def test_the_command(clip, tmp_path):
+    tips, goal, _ = clip
+    source = tmp_path / "clips.npz"
+    np.savez(
+        source,
+        fingertips=np.concatenate((tips, tips)),
+        goal_packed=np.packbits(np.concatenate((goal, goal)), axis=1),
+        length=np.array([len(tips), len(tips)]),
+    )
+    cli.main(["import-demos", str(source), "-o", str(tmp_path / "demos")])
+    files = sorted((tmp_path / "demos").iterdir())
+    assert [file.name for file in files] == ["clips-000.npz", "clips-001.npz"]
+    assert Demonstration.load(files[1]).score.title == "clips-001"
+
+
+def test_what_is_no_data(tmp_path):
+    empty = tmp_path / "empty.npz"
+    np.savez(empty, a=1)
+    wrong = tmp_path / "wrong.npz"
+    np.savez(wrong, fingertips=np.zeros((5, 2, 6, 3)), length=np.array([9]))
+    for path in (empty, wrong, tmp_path / "nowhere.npz", tmp_path):
+        with pytest.raises(InputError):
+            list(read_published(path))
+
+
+def test_the_published_ones(shared):
+    found = list(read_published(shared / "data" / "pianomime" / "demonstrations.npz", 2))
+    assert [total for _, total in found] == [2, 2]
+    for made, _ in found:
+        keys = made.plan.keys() & made.score.roll()
+        assert keys.sum() > 0.97 * made.score.roll().sum()

@@ -1,0 +1,194 @@
+"""From made-up videos of which everything is known, and from the real one."""
+
+from __future__ import annotations
+
+import av
+import made_up_video as made_up
+import numpy as np
+import pytest
+
+from pianomime import cli
+from pianomime.music import onset_f1
+from pianomime.plan import NO_KEY
+from pianomime.video import retarget as room
+from pianomime.video.demonstration import Demonstration
+from pianomime.video.film import Film
+from pianomime.video.retarget import RetargetConfig, retarget
+
+SIZE = (640, 360)
+LEAD = 0.7
+"""[s] that the MIDI file begins after the video."""
+
+
+@pytest.fixture(scope="module")
+def score():
+    return made_up.song(5.0)
+
+
+@pytest.fixture(scope="module")
+def plan(score):
+    return made_up.plan_of(score)
+
+
+@pytest.fixture(scope="module")
+def plane():
+    return made_up.camera(SIZE, turned=1.0)
+
+
+@pytest.fixture(scope="module")
+def video(tmp_path_factory, score, plan, plane):
+    path = tmp_path_factory.mktemp("video") / "made-up.mp4"
+    made_up.write(path, plane, SIZE, score, plan, made_up.times(5.0, 24))
+    return path
+
+
+@pytest.fixture
+def hands(monkeypatch, plane, plan, tmp_path):
+    """MediaPipe's part is played by one who knows."""
+    monkeypatch.setattr(room, "HandDetector", lambda _: made_up.TrueHands(plane, SIZE, plan))
+    model = tmp_path / "hand.task"
+    model.write_bytes(b"stands in")
+    return model
+
+
+@pytest.fixture
+def midi(tmp_path, score):
+    path = tmp_path / "song.mid"
+    score.clip(LEAD, 9.0).to_midi(path)
+    return path
+
+
+def test_with_midi(video, midi, hands, score, plan, plane):
+    made = retarget(video, RetargetConfig(midi=midi, hand_model=hands))
+    quality = made.demonstration.quality
+    assert quality["offset_seconds"] == pytest.approx(LEAD, abs=0.05)
+    assert quality["notes_touched"] > 0.9
+    assert quality["both_hands_found"] > 0.9
+    assert quality["left_right_swaps"] > 0
+    keys = made.plane.to_world(plane.to_pixels([[0.0, -0.5], [0.05, 0.0], [-0.05, 0.5]]))
+    np.testing.assert_allclose(keys, [[0.0, -0.5], [0.05, 0.0], [-0.05, 0.5]], atol=0.003)
+    # The same fingers as those that were drawn.
+    shown = made.demonstration
+    rows = min(len(shown.plan), len(plan))
+    known = plan.finger_key[:rows]
+    both = (known != NO_KEY) & (shown.plan.finger_key[:rows] != NO_KEY)
+    assert both.sum() > 0.8 * (known != NO_KEY).sum()
+    assert (known == shown.plan.finger_key[:rows])[both].mean() > 0.95
+    idle = (known == NO_KEY) & (shown.plan.finger_key[:rows] == NO_KEY)
+    off = np.linalg.norm(
+        shown.plan.fingertips[:rows, :, 1:, :2] - plan.fingertips[:rows, :, 1:, :2], axis=3
+    )
+    assert np.median(off[idle]) < 0.004
+    assert len(shown.score) == len(score.clip(LEAD, 9.0))
+
+
+def test_the_papers_rule(video, midi, hands):
+    made = retarget(video, RetargetConfig(midi=midi, hand_model=hands, align="paper"))
+    plan = made.demonstration.plan
+    assert set(np.unique(plan.fingertips[..., 2])) == {0.0, 0.045}
+    assert (plan.keys() & ~made.demonstration.score.roll()).sum() == 0
+    assert plan.keys().sum() > 0.9 * made.demonstration.score.roll().sum()
+
+
+def test_without_midi(video, hands, score):
+    read = retarget(video, RetargetConfig(hand_model=hands)).demonstration.score
+    assert onset_f1((score.key, score.onset), (read.key, read.onset), 0.1) > 0.95
+
+
+def test_another_song_is_noticed(video, hands, tmp_path, score):
+    other = tmp_path / "other.mid"
+    score.transpose(23).to_midi(other)
+    with pytest.raises(room.InputError, match="not what is played"):
+        retarget(video, RetargetConfig(midi=other, hand_model=hands))
+    made = retarget(video, RetargetConfig(midi=other, hand_model=hands, offset=0.0))
+    assert any("may not be" in remark for remark in made.remarks)
+
+
+def test_a_longer_song_is_cut(video, hands, tmp_path, score, plan, plane):
+    long = tmp_path / "long.mid"
+    made_up.song(5.0).to_midi(long)
+    short = tmp_path / "short.mp4"
+    made_up.write(short, plane, SIZE, score, plan, made_up.times(3.0, 20))
+    made = retarget(short, RetargetConfig(midi=long, hand_model=hands))
+    assert any("after the video ends" in remark for remark in made.remarks)
+    assert made.demonstration.score.duration <= 3.0
+
+
+def test_a_cut_is_noticed(hands, tmp_path, score, plan, plane, midi):
+    path = tmp_path / "cut.mp4"
+    made_up.write(path, plane, SIZE, score, plan, made_up.times(3.5, 20))
+    end = tmp_path / "end.mp4"
+    with av.open(str(end), "w") as film:
+        stream = film.add_stream("libx264", rate=20)
+        stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
+        for number, frame in enumerate([*made_up.frames(path), *[None] * 20]):
+            picture = (
+                np.full((SIZE[1], SIZE[0], 3), 90, np.uint8)
+                if frame is None
+                else frame.to_ndarray(format="rgb24")
+            )
+            new = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            new.pts = number
+            film.mux(stream.encode(new))
+        film.mux(stream.encode(None))
+    made = retarget(end, RetargetConfig(midi=midi, hand_model=hands))
+    assert any("not where it was" in remark and "3.5 s" in remark for remark in made.remarks)
+
+
+def test_the_command_writes_all_or_nothing(video, midi, hands, tmp_path, capsys):
+    out = tmp_path / "new" / "demo.npz"
+    model = ["--hand-model", str(hands)]
+    cli.main(["retarget", str(video), "--midi", str(midi), "-o", str(out), *model])
+    assert "pianomime play" in capsys.readouterr().out
+    assert Demonstration.load(out).source == video.name
+    overlay = Film(out.with_suffix(".mp4"))
+    assert (overlay.width, overlay.height) == SIZE
+    assert "Where tracking was poor" in out.with_suffix(".html").read_text("utf-8")
+    cli.main(["play", str(out), "--no-video", "--seconds", "1", "-o", str(tmp_path / "played")])
+    assert (tmp_path / "played" / "report.json").exists()
+
+
+def test_no_keyboard_and_no_hands(hands, tmp_path, monkeypatch, video, midi, capsys):
+    blank = tmp_path / "blank.mp4"
+    with av.open(str(blank), "w") as film:
+        stream = film.add_stream("libx264", rate=20)
+        stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
+        for _ in range(10):
+            grey = np.full((SIZE[1], SIZE[0], 3), 128, np.uint8)
+            film.mux(stream.encode(av.VideoFrame.from_ndarray(grey, format="rgb24")))
+        film.mux(stream.encode(None))
+
+    class Nobody(made_up.TrueHands):
+        def detect(self, *_):
+            return []
+
+    out = tmp_path / "out" / "demo.npz"
+    model = ["--hand-model", str(hands), "-o", str(out)]
+    for path, why in ((blank, "no keyboard"), (video, "no hands")):
+        monkeypatch.setattr(room, "HandDetector", lambda _: Nobody(None, SIZE, None))
+        with pytest.raises(SystemExit) as stopped:
+            cli.main(["retarget", str(path), "--midi", str(midi), *model])
+        assert stopped.value.code == 2
+        told = capsys.readouterr().err.strip()
+        assert why in told
+        assert "\n" not in told
+    assert not out.parent.exists()
+
+
+def test_the_real_one(shared):
+    pytest.importorskip("mediapipe")
+    folder = shared / "data" / "stan"
+    reference = np.load(folder / "reference.npz")
+    config = RetargetConfig(
+        midi=folder / "Stan_1.mid", hand_model=shared / "models" / "hand_landmarker.task"
+    )
+    made = retarget(folder / "Stan_1.mp4", config)
+    quality = made.demonstration.quality
+    assert quality["both_hands_found"] >= 0.99
+    assert quality["offset_seconds"] == pytest.approx(-3.23, abs=0.06)
+    rows = len(reference["finger_key"])
+    idle = reference["finger_key"] < 0
+    off = np.linalg.norm(
+        made.tracks.points[:rows, :, 1:] - reference["fingertips"][:, :, 1:, :2], axis=3
+    )
+    assert np.median(off[idle]) < 0.005
