@@ -39,7 +39,7 @@ def test_refuses_what_does_not_fit(name: str, value: NDArray[np.generic], messag
         plan(**{name: value})
 
 
-def test_keys_and_their_hands() -> None:
+def test_keys_of_both_hands() -> None:
     finger_key = np.full((3, 2, 5), NO_KEY, np.int8)
     finger_key[0, LEFT, 4] = 0
     finger_key[1, RIGHT, 0] = 40
@@ -48,6 +48,3 @@ def test_keys_and_their_hands() -> None:
     wanted = np.zeros((3, 88), bool)
     wanted[[0, 1, 1], [0, 39, 40]] = True
     np.testing.assert_array_equal(made.keys(), wanted)
-    owner = made.hand_of_key()
-    assert (owner[0, 0], owner[1, 39], owner[1, 40]) == (LEFT, LEFT, RIGHT)
-    np.testing.assert_array_equal(owner == NO_KEY, ~wanted)

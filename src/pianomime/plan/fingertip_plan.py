@@ -62,10 +62,3 @@ class FingertipPlan:
         frame, hand, finger = np.nonzero(self.finger_key >= 0)
         down[frame, self.finger_key[frame, hand, finger]] = True
         return down
-
-    def hand_of_key(self) -> NDArray[np.int8]:
-        """(T, 88) int8: the hand that presses a key in a frame, -1 for none."""
-        owner = np.full((len(self), 88), NO_KEY, np.int8)
-        frame, hand, finger = np.nonzero(self.finger_key >= 0)
-        owner[frame, self.finger_key[frame, hand, finger]] = hand
-        return owner
