@@ -146,7 +146,7 @@ class Player:
         plan = self.planner.plan(score)
         planned = time.perf_counter()
 
-        frames = len(score.roll())
+        frames = score.frames()
         pedal = score.pedal_roll()
         ctrl = np.empty((frames, 46))
         qpos = np.empty((frames, 142))

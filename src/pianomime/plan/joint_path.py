@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from pianomime.world.figures import CONTROL_DT, HAND_JOINTS, key_centres, key_half_sizes
+from pianomime.world.figures import BLACK, CONTROL_DT, HAND_JOINTS, key_centres, key_half_sizes
 from pianomime.world.hand import Hand
 
 HOME = np.array(
@@ -31,6 +31,8 @@ WHITE_REST, BLACK_REST = (
     float(key_centres()[key, 2] + key_half_sizes()[key, 2]) + TIP_RADIUS for key in (0, 1)
 )
 """[m] Height of a fingertip's site when it rests on a white or a black key."""
+KEY_REST = np.where(BLACK, BLACK_REST, WHITE_REST)
+"""(88,) [m] The same, key by key."""
 
 # Joints 2 and 1 of each finger hang on one tendon and turn together when nothing touches them.
 _HELD = 1e9

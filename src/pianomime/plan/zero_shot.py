@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pianomime.music import Score
 from pianomime.plan.fingering import Fingering, FingeringConfig, find_fingering
 from pianomime.plan.fingertip_plan import NO_KEY, FingertipPlan
-from pianomime.plan.joint_path import BLACK_REST, WHITE_REST, PathConfig, smooth_path
+from pianomime.plan.joint_path import KEY_REST, PathConfig, smooth_path
 from pianomime.world.figures import BLACK, HAND_JOINTS, key_centres
 from pianomime.world.hand import SIDES, Hand
 
@@ -70,11 +70,10 @@ class ZeroShotPlanner:
         weights = np.zeros((frames, 6, 3))
         clearance = np.full((frames, 5), self.config.hover)
         centres = key_centres()
-        rest = np.where(BLACK, BLACK_REST, WHITE_REST)
         for finger in range(5):
             for first, end, key in _presses(finger_key[:, finger]):
                 point = np.array(
-                    [(_BLACK_X if BLACK[key] else _WHITE_X)[finger], centres[key, 1], rest[key]]
+                    [(_BLACK_X if BLACK[key] else _WHITE_X)[finger], centres[key, 1], KEY_REST[key]]
                 )
                 down = slice(first, end)
                 targets[down, finger + 1] = point - [0.0, 0.0, 0.009]
@@ -96,8 +95,7 @@ class ZeroShotPlanner:
 
 def finger_keys(score: Score, fingering: Fingering) -> NDArray[np.int8]:
     """(T, 2, 5) int8: the key each finger presses in each frame, as the score's roll has it."""
-    roll = score.roll()
-    keys = np.full((len(roll), 2, 5), NO_KEY, np.int8)
+    keys = np.full((score.frames(), 2, 5), NO_KEY, np.int8)
     for note, first in enumerate(score.note_frames()[:, 0]):
         if fingering.hand[note] >= 0:
             keys[first : fingering.stop[note], fingering.hand[note], fingering.finger[note]] = (

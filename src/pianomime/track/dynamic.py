@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from pianomime.plan import FingertipPlan
 from pianomime.plan.joint_path import (
-    BLACK_REST,
-    WHITE_REST,
+    KEY_REST,
     PathConfig,
     resting_height,
     smooth_path,
 )
 from pianomime.world import World
-from pianomime.world.figures import BLACK, CONTROL_DT, key_centres
+from pianomime.world.figures import CONTROL_DT, HAND_JOINTS, key_centres
 from pianomime.world.hand import SIDES, Hand
 
 # Forearm slides and wrist, the first joints of a hand.
@@ -65,7 +64,6 @@ class DynamicTracker:
 
     def begin(self, plan: FingertipPlan) -> None:
         """Work out the joint paths and the controls that follow them, from the rest pose."""
-        start = World().qpos
         self._finger_key = plan.finger_key
         self._paths = []
         self._tips = []
@@ -76,7 +74,7 @@ class DynamicTracker:
             targets, weights = self._wishes(plan.fingertips[:, index], plan.finger_key[:, index])
             clearance = np.full(pressing.shape, np.nan)
             path = smooth_path(
-                hand, start[hand.joints], targets, weights, clearance, self.config.path
+                hand, np.zeros(HAND_JOINTS), targets, weights, clearance, self.config.path
             )
             self._paths.append(path)
             self._tips.append(np.array([hand.points(pose)[1:] for pose in path]))
@@ -140,8 +138,7 @@ class DynamicTracker:
         weights[:, 0] = [0.0, 1 / 0.05, 0.0]
         weights[:, 1:] = 1 / 0.004
         pressing = finger_key >= 0
-        rest = np.where(BLACK, BLACK_REST, WHITE_REST)
-        targets[:, 1:, 2][pressing] = rest[finger_key[pressing]] - self.config.depth
+        targets[:, 1:, 2][pressing] = KEY_REST[finger_key[pressing]] - self.config.depth
         weights[:, 1:][pressing] = 1 / np.array([0.004, 0.0015, 0.001])
         return targets, weights
 
