@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +12,8 @@ from hypothesis import strategies as st
 from any_score import chord, melody, score_of, scores
 from pianomime.music import Score
 from pianomime.plan import LEFT, RIGHT
-from pianomime.plan import fingering as fingering_module
+from pianomime.plan import hand_cost as hand_cost_module
+from pianomime.plan import reach as reach_module
 from pianomime.plan.fingering import Fingering, find_fingering
 from pianomime.song_files import find_song
 from pianomime.world.figures import BLACK, key_centres
@@ -43,8 +46,8 @@ def test_any_score_gets_a_fingering(score: Score) -> None:
 def test_a_finger_plays_one_key_at_a_time(score: Score) -> None:
     fingering = find_fingering(score)
     busy: dict[tuple[int, int, int], int] = {}
-    for note, (hand, finger, key, first) in on_fingers(score, fingering):
-        for frame in range(first, int(fingering.stop[note])):
+    for note, (hand, finger, key, _) in on_fingers(score, fingering):
+        for frame in range(int(fingering.start[note]), int(fingering.stop[note])):
             assert busy.setdefault((hand, finger, frame), key) == key
 
 
@@ -54,8 +57,22 @@ def test_notes_are_cut_short_at_most(score: Score) -> None:
     fingering = find_fingering(score)
     first, end = score.note_frames().T
     played = fingering.hand >= 0
+    assert (fingering.start >= first).all()
     assert (fingering.stop <= end).all()
-    assert (fingering.stop > first)[played & (first < end)].all()
+    assert (fingering.stop > fingering.start)[played & (first < end)].all()
+
+
+def test_hands_that_need_it_leave_early_and_arrive_late() -> None:
+    """Chords for two hands, far away from each other, without a pause between them."""
+    low, high = [15, 19, 34, 39], [46, 51, 67, 70]
+    score = score_of(*((key, 20, 40) for key in low), *((key, 40, 60) for key in high))
+    fingering = find_fingering(score)
+    first, end = score.note_frames().T
+    assert (fingering.hand >= 0).all()
+    cut, late = fingering.stop < end, fingering.start > first
+    assert (cut | late).any()
+    assert not (cut & (score.onset > 1.0)).any()
+    assert not (late & (score.onset <= 1.0)).any()
 
 
 @settings(max_examples=60, deadline=None)
@@ -147,12 +164,19 @@ def test_the_keyboard_has_a_mirror() -> None:
 
 
 @pytest.fixture
-def symmetric_keyboard(monkeypatch: pytest.MonkeyPatch) -> None:
+def symmetric_keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A keyboard whose mirror is exact, and in the middle between the resting hands."""
     along = key_centres()[:, 1].copy()
     keys = np.arange(MIRROR + 1)
     along[keys] = (along[keys] - along[MIRROR - keys]) / 2
-    monkeypatch.setattr(fingering_module, "key_centres", lambda: along[:, None][:, [0, 0, 0]])
+    exact = along[:, None][:, [0, 0, 0]]
+    for module in (hand_cost_module, reach_module):
+        monkeypatch.setattr(module, "key_centres", lambda: exact)
+    reach_module.stretch.cache_clear()
+    hand_cost_module.pair_cost.cache_clear()
+    yield
+    reach_module.stretch.cache_clear()
+    hand_cost_module.pair_cost.cache_clear()
 
 
 @pytest.mark.usefixtures("symmetric_keyboard")

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.music import Score
-from pianomime.plan.fingering import Fingering, FingeringConfig, find_fingering
+from pianomime.plan.fingering import Fingering, find_fingering
 from pianomime.plan.fingertip_plan import NO_KEY, FingertipPlan
+from pianomime.plan.hand_cost import FingeringConfig
 from pianomime.plan.joint_path import KEY_REST, PathConfig, smooth_path
 from pianomime.world.figures import BLACK, HAND_JOINTS, key_centres
 from pianomime.world.hand import SIDES, Hand
@@ -96,11 +97,9 @@ class ZeroShotPlanner:
 def finger_keys(score: Score, fingering: Fingering) -> NDArray[np.int8]:
     """(T, 2, 5) int8: the key each finger presses in each frame, as the score's roll has it."""
     keys = np.full((score.frames(), 2, 5), NO_KEY, np.int8)
-    for note, first in enumerate(score.note_frames()[:, 0]):
-        if fingering.hand[note] >= 0:
-            keys[first : fingering.stop[note], fingering.hand[note], fingering.finger[note]] = (
-                score.key[note]
-            )
+    for note in np.flatnonzero(fingering.hand >= 0):
+        down = slice(fingering.start[note], fingering.stop[note])
+        keys[down, fingering.hand[note], fingering.finger[note]] = score.key[note]
     return keys
 
 

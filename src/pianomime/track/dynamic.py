@@ -26,6 +26,8 @@ from pianomime.world.hand import SIDES, Hand
 
 # Forearm slides and wrist, the first joints of a hand.
 _ARM_JOINTS = 5
+# The forearm's slide along the keyboard.
+_SLIDE = 0
 # [m] Lifts of a fingertip per radian that count as nothing.
 _LIFT_DAMPING = 0.01
 
@@ -101,11 +103,13 @@ class DynamicTracker:
             # A finger corrects itself: moving wrist or forearm would move all the others.
             jacobian[..., :_ARM_JOINTS] = 0.0
             keys = self._finger_key[frame, index]
+            error = self._tips[index][frame] - tips
             beside = np.abs(tips[:, 1] - key_centres()[keys, 1]) > self.config.astray
             low = tips[:, 2] < resting_height(tips[:, 0]) - self.config.sunk
             lift = np.where(keys >= 0, beside, low)
             move = self.config.joint_feedback * (self._paths[index][frame] - here)
-            move += self._reach(jacobian, self._tips[index][frame] - tips)
+            move += self._reach(jacobian, error)
+            move[_SLIDE] += _shared(error[keys >= 0, 1])
             move += self._lift(jacobian[lift, 2])
             press = self._press[index][frame][~lift].sum(axis=0)
             ctrl[hand.actuators] += hand.to_ctrl @ move + press
@@ -141,6 +145,15 @@ class DynamicTracker:
         targets[:, 1:, 2][pressing] = KEY_REST[finger_key[pressing]] - self.config.depth
         weights[:, 1:][pressing] = 1 / np.array([0.004, 0.0015, 0.001])
         return targets, weights
+
+
+def _shared(error: NDArray[np.float64]) -> float:
+    """How far [m] the forearm goes to take the errors of pressing fingers (F,) [m] off them.
+
+    Stretched fingers are at the end of what their joints can do: only the forearm can help, all
+    of them alike. Of the error of a single finger it takes half.
+    """
+    return float(error.sum()) / (len(error) + 1)
 
 
 def motion_torque(hand: Hand, path: NDArray[np.float64]) -> NDArray[np.float64]:

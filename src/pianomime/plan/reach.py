@@ -1,0 +1,84 @@
+"""How near and how far two fingers of a hand can hold keys, from the hand's kinematics.
+
+The distances in `reach.json` are measured by inverse kinematics (`benchmarks/reach.py`).
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.plan.fingertip_plan import LEFT
+from pianomime.world.figures import BLACK, KEYS, key_centres
+
+_FIGURES: dict[str, Any] = json.loads(
+    resources.files("pianomime.plan").joinpath("reach.json").read_text("utf-8")
+)
+
+EASE: NDArray[np.float64] = np.array(_FIGURES["ease"])
+"""(5,) [m] where the fingertips of a right hand at ease lie along the keyboard, from the middle
+finger; those of a left hand lie the other way."""
+
+
+def pair_limits(low: int, high: int, low_black: bool, high_black: bool) -> tuple[float, float]:
+    """The smallest and the largest distance [m] at which two fingers can hold keys.
+
+    Args:
+        low: a finger of a right hand, 0 thumb .. 4 little, and
+        high: one further from the thumb.
+        low_black: whether `low` is on a black key, and
+        high_black: whether `high` is.
+
+    Returns:
+        Distances along the keyboard from `low` to `high`; negative where the fingers cross.
+    """
+    return _limits()[low, high, low_black, high_black]
+
+
+@cache
+def _limits() -> dict[tuple[int, int, bool, bool], tuple[float, float]]:
+    return {
+        (*row["fingers"], *row["black"]): (row["least"], row["most"]) for row in _FIGURES["pairs"]
+    }
+
+
+@cache
+def stretch(side: int) -> NDArray[np.float64]:
+    """How far a hand is stretched, or its fingers crossed, to hold two keys.
+
+    Args:
+        side: `LEFT` or `RIGHT`.
+
+    Returns:
+        (5, 5, 89, 89): for two fingers and their keys, 0 where they lie as in a hand at ease,
+        1 at the limit of reach, inf beyond it; 0 for a finger and itself. The 89th key is "none".
+        Read-only.
+    """
+    along = key_centres()[:, 1]
+    table = np.zeros((5, 5, KEYS + 1, KEYS + 1))
+    black = BLACK.astype(int)
+    for low in range(5):
+        for high in range(low + 1, 5):
+            distance = along[None, :] - along[:, None]  # from the key of `low` to that of `high`
+            if side == LEFT:
+                distance = -distance
+            limits = np.array(
+                [[pair_limits(low, high, bool(a), bool(b)) for b in (0, 1)] for a in (0, 1)]
+            )
+            least, most = np.moveaxis(limits[black[:, None], black[None, :]], -1, 0)
+            ease = EASE[high] - EASE[low]
+            share = np.where(
+                distance > ease,
+                (distance - ease) / (most - ease),
+                (ease - distance) / (ease - least),
+            )
+            share[share > 1.0] = np.inf
+            table[low, high, :KEYS, :KEYS] = share
+            table[high, low, :KEYS, :KEYS] = share.T
+    table.setflags(write=False)
+    return table
