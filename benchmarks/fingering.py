@@ -27,6 +27,7 @@ import common
 from pianomime.music import Score
 from pianomime.plan.fingering import find_fingering
 from pianomime.plan.fingertip_plan import LEFT, RIGHT
+from pianomime.plan.hand_cost import FingeringConfig
 from pianomime.world.figures import KEYS
 
 _LOWEST_MIDI = 21
@@ -90,9 +91,9 @@ def clips(shared: Path) -> Iterator[Piece]:
         yield Piece(score, hand, finger)
 
 
-def compare(piece: Piece) -> Count:
+def compare(piece: Piece, config: FingeringConfig | None = None) -> Count:
     """How far the search and the human agree."""
-    found = find_fingering(piece.score)
+    found = find_fingering(piece.score, config)
     known = piece.hand >= 0
     same_hand = known & (found.hand == piece.hand)
     same_finger = same_hand & (found.finger == piece.finger)

@@ -35,9 +35,9 @@ class FingeringConfig:
     """For a held note that is let go early, beside the frames it loses."""
     late: float = 1.5
     """For a note that begins late, beside the frames it loses."""
-    stretch: float = 4.0
+    stretch: float = 6.0
     """For two fingers at the limit of their reach; it grows with the fourth power."""
-    strain: float = 1.0
+    strain: float = 2.0
     """The same, but it grows with the square."""
     travel_speed: float = 0.5
     """[m/s] of a hand that costs 1 for each note it strikes (it grows with the square)."""
