@@ -150,7 +150,7 @@ def _made_up(
         model.write_bytes(b"not used")
 
         def detector(_: Path) -> made_up.TrueHands:
-            return made_up.TrueHands(plane, size, plan)
+            return made_up.TrueHands(plane, size, plan.fingertips[..., :2])
 
         with patch.object(room, "HandDetector", detector):
             made = retarget(video, RetargetConfig(midi=midi, hand_model=model))

@@ -81,6 +81,22 @@ def test_offset_from_fingers_and_light(score, points, late):
     assert estimate_offset(score, tracks(seen), light).seconds == pytest.approx(late, abs=0.051)
 
 
+def test_a_repeat_is_not_taken_for_the_beginning():
+    """The theme comes twice, and the second time the fingers are seen less well."""
+    theme = made_up.song(5.0)
+    score = Score(
+        np.concatenate((theme.key, theme.key)),
+        np.concatenate((theme.onset, theme.onset + 4.5)),
+        np.concatenate((theme.offset, theme.offset + 4.5)),
+        np.full(2 * len(theme), 80),
+    )
+    points = made_up.plan_of(score).fingertips[..., :2].copy()
+    second = points[100:]
+    second += np.random.default_rng(0).normal(0, 0.007, second.shape)
+    dark = np.full((len(points), 2, 88, 3), DARK, np.uint8)
+    assert estimate_offset(score, tracks(points), dark).seconds == pytest.approx(0, abs=0.3)
+
+
 def test_another_song_does_not_match(points):
     draw = np.random.default_rng(5)
     onset = np.sort(draw.uniform(0, 7, 60))

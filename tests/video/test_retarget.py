@@ -45,7 +45,9 @@ def video(tmp_path_factory, score, plan, plane):
 @pytest.fixture
 def hands(monkeypatch, plane, plan, tmp_path):
     """MediaPipe's part is played by one who knows."""
-    monkeypatch.setattr(room, "HandDetector", lambda _: made_up.TrueHands(plane, SIZE, plan))
+    monkeypatch.setattr(
+        room, "HandDetector", lambda _: made_up.TrueHands(plane, SIZE, plan.fingertips[..., :2])
+    )
     model = tmp_path / "hand.task"
     model.write_bytes(b"stands in")
     return model
