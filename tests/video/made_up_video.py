@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.video.drawing import key_outline
-from pianomime.video.hand_detector import Sighting
 from pianomime.video.plane import Plane, fit_plane
+from pianomime.video.sightings import Sighting
 from pianomime.world.figures import BLACK
 
 RATE = 20.0
