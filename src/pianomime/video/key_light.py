@@ -15,8 +15,12 @@ from pianomime.world.figures import BLACK, KEYS, key_centres
 ZONES = {
     "above the keys": (-0.088, -0.080),
     "far end": (-0.070, -0.055),
+    "between the black keys": (-0.050, -0.040),
 }
-"""World x from and to [m] of the patches, where hands do not hide them."""
+"""World x from and to [m] of the patches."""
+LIT = range(2)
+"""Numbers of those zones in which keys light up, and which hands do not hide. In the others keys
+that go down change their shade, and hands come and go."""
 
 _SOME = 2000
 """Frames."""

@@ -13,7 +13,7 @@ from scipy.signal import fftconvolve
 
 from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
-from pianomime.video.key_light import ZONES, Glow
+from pianomime.video.key_light import LIT, Glow
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -60,7 +60,7 @@ def estimate_offset(
     )
     evidence, _, _ = _correlate(lambda key: touching(points, key), len(points), score)
     best_light, best_peak = np.zeros(len(lags)), 0.0
-    for zone, colourful in product(range(len(ZONES)), (True, False)):
+    for zone, colourful in product(LIT, (True, False)):
         rise = partial(_rise, Glow(light, zone, colourful))
         found, _, _ = _correlate(rise, len(points), score)
         peak = float(found.max() - np.median(found))

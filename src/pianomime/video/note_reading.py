@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
-from pianomime.video.key_light import ZONES, Glow
+from pianomime.video.key_light import LIT, ZONES, Glow
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -20,10 +21,27 @@ _SHORTEST = 2
 """Frames."""
 _FALSE = 2.0
 """How much worse a note that no finger plays is than a note that one does is good."""
+_DOUBT = 1.4
+"""How many times as many notes keys must seem to play by going down as by lighting up, for the
+first to be believed."""
 _VELOCITY = 80
 
 
-def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> tuple[Score, float]:
+class ReadNotes(NamedTuple):
+    """Notes, and how they were found.
+
+    Attributes:
+        score: the notes, without pedal.
+        touched: share of them that a finger is on.
+        lit: their keys light up; otherwise they only go down, and many are missed.
+    """
+
+    score: Score
+    touched: float
+    lit: bool
+
+
+def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> ReadNotes:
     """Find the notes that agree best with the fingers.
 
     The places where a note may show, and how strong a sign is asked for, are those that give the
@@ -33,18 +51,19 @@ def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> tupl
         light: (T, zones, 88, 3), see `KeyLight`.
         tracks: the hands.
         title: of the score.
-
-    Returns:
-        The score, without pedal, and the share of its notes that a finger is on.
     """
     near = np.stack([touching(tracks.points, key) > _TOUCHED for key in range(KEYS)], axis=1)
-    best: tuple[float, NDArray[np.int64]] = (0.0, np.zeros((0, 3), np.int64))
+    best: tuple[float, NDArray[np.int64], bool] = (0.0, np.zeros((0, 3), np.int64), True)
     for zone, colourful, share in product(range(len(ZONES)), (True, False), _SHARES):
         glow = Glow(light, zone, colourful)
         for notes in _runs(glow, share):
             worth = _worth(notes, near)
+            if zone not in LIT:
+                # Hands and their shadows change a key as much as going down does.
+                notes = notes[_touched(notes, near)]
+                worth /= _DOUBT
             if worth > best[0]:
-                best = worth, notes
+                best = worth, notes, zone in LIT
     notes = best[1]
     touched = _touched(notes, near)
     score = Score(
@@ -54,7 +73,7 @@ def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> tupl
         velocity=np.full(len(notes), _VELOCITY),
         title=title,
     )
-    return score, float(touched.mean()) if len(notes) else 0.0
+    return ReadNotes(score, float(touched.mean()) if len(notes) else 0.0, best[2])
 
 
 def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:

@@ -261,18 +261,26 @@ def _score(
     """What is played, timed by the video, and figures about it."""
     seconds = len(tracks) / RATE
     if score is None or offset is None:
-        read, touched = read_notes(light, tracks, film.path.stem)
-        if not len(read):
+        read = read_notes(light, tracks, film.path.stem)
+        if not len(read.score):
             raise InputError(
                 f"{film.path}: no keys are seen going down or lighting up; name what is played "
                 "with --midi"
             )
-        if touched < _FEW_TOUCHED:
+        if not read.lit:
             remarks.append(
-                f"the notes are read off the video and doubtful: {touched:.0%} have a finger on "
-                "their key"
+                "no keys light up: the notes are read off keys that change their shade when they "
+                "go down, and many are missed (a MIDI file would tell)"
             )
-        return on_grid(read), {"notes_from": "video", "notes_touched": round(touched, 4)}
+        if read.touched < _FEW_TOUCHED:
+            remarks.append(
+                f"the notes are read off the video and doubtful: {read.touched:.0%} have a finger "
+                "on their key"
+            )
+        return on_grid(read.score), {
+            "notes_from": "video, from keys that " + ("light up" if read.lit else "go down"),
+            "notes_touched": round(read.touched, 4),
+        }
     if config.offset is None and offset.touched < _TOO_FEW_TOUCHED:
         raise InputError(
             f"{config.midi} is not what is played in {film.path}: at best {offset.touched:.0%} of "
