@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.errors import InputError
+from pianomime.archive import read_archive
 from pianomime.files import atomic
 from pianomime.music import Score, frame_metrics, notes_from_roll, onset_f1, pedal_f1
 from pianomime.plan import FingertipPlan
@@ -173,23 +173,7 @@ class Performance:
             OSError: there is no such file, or it cannot be read.
             InputError: it is no performance, or one of a version that we do not know.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = dict(file)
-            version = int(arrays["version"])
-            made = cls._from_arrays(arrays) if version == _VERSION else None
-        except (FileNotFoundError, IsADirectoryError, PermissionError):
-            raise
-        except Exception as error:
-            # On damaged data zipfile, zlib and numpy raise all kinds of errors, and what they say,
-            # such as to allow pickles, is no advice for a user.
-            raise InputError(f"{path}: not a performance, or a damaged one") from error
-        if made is None:
-            raise InputError(
-                f"{path}: a performance of version {version}; this program reads {_VERSION}: "
-                "play the song again"
-            )
-        return made
+        return read_archive(path, "a performance", ("version", _VERSION), cls._from_arrays)
 
     @classmethod
     def _from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Performance:

@@ -15,8 +15,8 @@ from PIL import Image, ImageDraw
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.video.drawing import key_outline
-from pianomime.video.hand_detector import Sighting
 from pianomime.video.plane import Plane, fit_plane
+from pianomime.video.sightings import Sighting
 from pianomime.world.figures import BLACK
 
 RATE = 20.0
@@ -152,14 +152,18 @@ class TrueHands:
     Args:
         plane: of the video's pictures.
         size: of the video's pictures [pixels].
-        plan: of the hands.
+        points: (T, 2, 6, 2) world x, y [m] where the hands seem to be, 20 frames a second.
         noise: standard deviation [m].
     """
 
     def __init__(
-        self, plane: Plane, size: tuple[int, int], plan: FingertipPlan, noise: float = 0.001
+        self,
+        plane: Plane,
+        size: tuple[int, int],
+        points: NDArray[np.float64],
+        noise: float = 0.001,
     ) -> None:
-        self._plane, self._size, self._plan, self._noise = plane, size, plan, noise
+        self._plane, self._size, self._points, self._noise = plane, size, points, noise
         self._draw = np.random.default_rng(0)
 
     def __enter__(self) -> TrueHands:
@@ -169,8 +173,8 @@ class TrueHands:
         pass
 
     def detect(self, _: NDArray[np.uint8], milliseconds: int) -> list[Sighting]:
-        row = min(int(milliseconds * RATE / 1000 + 0.5), len(self._plan) - 1)
-        points = self._plan.fingertips[row, :, :, :2]
+        row = min(int(milliseconds * RATE / 1000 + 0.5), len(self._points) - 1)
+        points = self._points[row]
         points = points + self._draw.normal(0, self._noise, points.shape)
         seen = self._plane.to_pixels(points) / self._size
         sightings = [Sighting(seen[0], 0.1), Sighting(seen[1], 0.9)]

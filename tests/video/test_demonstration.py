@@ -37,10 +37,26 @@ def test_other_files_are_refused(shown, tmp_path):
     np.savez(other, demonstration_version=99)
     foreign = tmp_path / "foreign.npz"
     np.savez(foreign, a=1)
-    for path in (bad, other, foreign, tmp_path / "nowhere.npz"):
+    for path in (bad, other, foreign):
         with pytest.raises(InputError) as caught:
             Demonstration.load(path)
         assert "\n" not in str(caught.value)
+    with pytest.raises(FileNotFoundError):
+        Demonstration.load(tmp_path / "nowhere.npz")
+
+
+def test_damaged_files_are_refused(shown, tmp_path):
+    path = tmp_path / "demo.npz"
+    shown.save(path)
+    whole = path.read_bytes()
+    refused = 0
+    for place in range(200, len(whole), max(1, len(whole) // 40)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 255]) + whole[place + 1 :])
+        try:
+            Demonstration.load(path)
+        except InputError:
+            refused += 1
+    assert refused > 20
 
 
 @settings(max_examples=40, deadline=None)

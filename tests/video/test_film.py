@@ -17,9 +17,9 @@ def clock(path, shown, size=(64, 48)):
         stream = film.add_stream("libx264", rate=60)
         stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
         stream.time_base = stream.codec_context.time_base = made_up.Fraction(1, 6000)
-        stream.options = {"crf": "10"}
+        stream.options = {"crf": "10", "g": "48"}
         for at in shown:
-            level = np.full((size[1], size[0], 3), 20 + round(50 * at), np.uint8)
+            level = np.full((size[1], size[0], 3), (20 + round(50 * at)) % 236, np.uint8)
             frame = av.VideoFrame.from_ndarray(level, format="rgb24")
             frame.pts, frame.time_base = round(at * 6000), made_up.Fraction(1, 6000)
             film.mux(stream.encode(frame))
@@ -39,6 +39,16 @@ def test_steady_rate_from_any_rate(tmp_path, fps, seed):
     np.testing.assert_allclose(np.abs(told - due), np.abs(nearest - due), atol=1e-3)
     level = np.array([frame.picture.mean() for frame in frames])
     np.testing.assert_allclose(level, 20 + 50 * told, atol=4)
+
+
+@pytest.mark.parametrize(("fps", "seed"), [(24, None), (30, 3)])
+def test_frames_from_the_middle_on_are_the_same(tmp_path, fps, seed):
+    film = Film(clock(tmp_path / "clock.mp4", made_up.times(20.0, fps, seed)))
+    all_of_them = list(film.frames(20))
+    for first in (1, 50, 333):
+        part = list(film.frames(20, first))
+        assert [frame.seconds for frame in part] == [frame.seconds for frame in all_of_them[first:]]
+        np.testing.assert_array_equal(part[0].picture, all_of_them[first].picture)
 
 
 def test_large_pictures_are_shrunk(tmp_path):

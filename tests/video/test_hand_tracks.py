@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from pianomime.plan import LEFT, RIGHT
-from pianomime.video.hand_detector import Sighting
 from pianomime.video.hand_tracks import follow, poorly_seen
+from pianomime.video.sightings import Sighting
 
 SIZE = (1280, 720)
 

@@ -64,6 +64,57 @@ def test_the_command(clip, tmp_path):
     assert Demonstration.load(files[1]).score.title == "clips-001"
 
 
+@pytest.fixture
+def data_set(clip, tmp_path):
+    """As PianoMime publishes it: zarr 2, Blosc with LZ4, four frames a row, inclusive ends."""
+    zarr = pytest.importorskip("zarr")
+    numcodecs = pytest.importorskip("numcodecs")
+    tips, _, finger_key = clip
+    frames = np.hstack((tips.reshape(len(tips), -1), (finger_key.reshape(-1, 10) + 1) / 89))
+    following = np.minimum(np.arange(len(tips))[:, None] + np.arange(4), len(tips) - 1)
+    action = frames[following].reshape(len(tips), -1).astype(np.float32)
+    short = action[:50]
+    folder = tmp_path / "high-level.zarr"
+    root = zarr.open_group(str(folder), mode="w", zarr_format=2)
+    for name, array in (
+        ("data/action", np.vstack((action, short))),
+        ("data/state", np.zeros((len(action) + 50, 212), np.float32)),
+        ("meta/episode_ends", np.array([len(action) - 1, len(action) + 49], np.float32)),
+    ):
+        root.create_array(
+            name, data=array, chunks=(30, *array.shape[1:]), compressors=numcodecs.Blosc("lz4")
+        )
+    return folder
+
+
+def test_the_published_data_set(clip, data_set, tmp_path):
+    tips, goal, finger_key = clip
+    cli.main(["import-demos", str(data_set), "-o", str(tmp_path / "demos")])
+    files = sorted((tmp_path / "demos").iterdir())
+    assert [file.name for file in files] == ["high-level-000.npz", "high-level-001.npz"]
+    first, second = map(Demonstration.load, files)
+    np.testing.assert_array_equal(first.score.roll()[: len(goal)], goal)
+    np.testing.assert_array_equal(first.plan.finger_key[: len(goal)], finger_key)
+    np.testing.assert_allclose(first.plan.fingertips[: len(goal)], tips, atol=1e-6)
+    np.testing.assert_array_equal(second.score.roll()[:50], goal[:50])
+
+
+def test_other_zarr_folders(data_set, tmp_path):
+    zarr = pytest.importorskip("zarr")
+    low_level = tmp_path / "low-level.zarr"
+    root = zarr.open_group(str(low_level), mode="w", zarr_format=2)
+    for name, width in (("state", 404), ("action", 46)):
+        root.create_array(name, data=np.zeros((8, width), np.float32))
+    root.create_array("episode_ends", data=np.array([7.0]))
+    array = tmp_path / "array.zarr"
+    zarr.save_array(str(array), np.zeros(5))
+    (data_set / "data" / "action" / "0.0").write_bytes(b"damaged")
+    for folder in (low_level, array, data_set):
+        with pytest.raises(InputError, match="not PianoMime's high-level data set") as told:
+            list(read_published(folder))
+        assert "\n" not in str(told.value)
+
+
 def test_what_is_no_data(tmp_path):
     empty = tmp_path / "empty.npz"
     np.savez(empty, a=1)

@@ -45,7 +45,9 @@ def video(tmp_path_factory, score, plan, plane):
 @pytest.fixture
 def hands(monkeypatch, plane, plan, tmp_path):
     """MediaPipe's part is played by one who knows."""
-    monkeypatch.setattr(room, "HandDetector", lambda _: made_up.TrueHands(plane, SIZE, plan))
+    monkeypatch.setattr(
+        room, "HandDetector", lambda _: made_up.TrueHands(plane, SIZE, plan.fingertips[..., :2])
+    )
     model = tmp_path / "hand.task"
     model.write_bytes(b"stands in")
     return model
@@ -112,6 +114,42 @@ def test_a_longer_song_is_cut(video, hands, tmp_path, score, plan, plane):
     made = retarget(short, RetargetConfig(midi=long, hand_model=hands))
     assert any("after the video ends" in remark for remark in made.remarks)
     assert made.demonstration.score.duration <= 3.0
+
+
+def test_one_hand_is_enough(video, midi, hands, plane, plan, monkeypatch):
+    class OneHand(made_up.TrueHands):
+        def detect(self, *given):
+            return [hand for hand in super().detect(*given) if hand.right > 0.5][:1]
+
+    seen = OneHand(plane, SIZE, plan.fingertips[..., :2])
+    monkeypatch.setattr(room, "HandDetector", lambda _: seen)
+    made = retarget(video, RetargetConfig(midi=midi, hand_model=hands))
+    assert "only one hand is seen: the left one is made up, at rest" in made.remarks
+    assert made.demonstration.quality["right_hand_found"] > 0.9
+
+
+def test_an_interruption_leaves_nothing(video, midi, hands, tmp_path, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Demonstration, "save", interrupt)
+    out = tmp_path / "out" / "demo.npz"
+    given = ["--midi", str(midi), "--hand-model", str(hands), "-o", str(out)]
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["retarget", str(video), *given])
+    assert stopped.value.code == 130
+    assert not out.parent.exists()
+
+
+def test_the_video_is_not_overwritten(video, midi, hands, capsys):
+    before = video.read_bytes()
+    given = ["--midi", str(midi), "--hand-model", str(hands), "-o", str(video.with_suffix(".npz"))]
+    for more in ([], ["--no-overlay"]):
+        with pytest.raises(SystemExit) as stopped:
+            cli.main(["retarget", str(video), *given, *more])
+        assert stopped.value.code == 2
+        assert "would be overwritten" in capsys.readouterr().err
+    assert video.read_bytes() == before
 
 
 def test_a_cut_is_noticed(hands, tmp_path, score, plan, plane, midi):

@@ -13,9 +13,9 @@ import tyro
 class ImportDemos:
     """Make demonstrations of the paper's published data, with its known faults repaired.
 
-    SOURCE is a folder with PianoMime's high-level zarr data set (needs the package zarr), an .npz
-    file of clips one after the other (length, fingertips, goal_packed), or one of a single clip
-    (fingertips, goal). OUT then holds one .npz for each clip.
+    SOURCE is a folder with PianoMime's high-level zarr data set, an .npz file of clips one after
+    the other (length, fingertips, goal_packed), or one of a single clip (fingertips, goal). OUT
+    then holds one .npz for each clip.
 
     Examples:
       pianomime import-demos DATASET.zarr -o demos

@@ -48,6 +48,7 @@ class Retarget:
         """
         from pianomime.commands.progress import bars
         from pianomime.errors import InputError
+        from pianomime.report import staged
         from pianomime.video.overlay import write_overlay
         from pianomime.video.retarget import RetargetConfig, retarget
         from pianomime.video.summary import write_summary
@@ -57,19 +58,24 @@ class Retarget:
             raise InputError(f"{out}: a demonstration is a file that ends in .npz")
         if out.exists() and out.is_dir():
             raise InputError(f"{out}: is a folder; a file is needed")
+        overlay, page = out.with_suffix(".mp4"), out.with_suffix(".html")
+        ours = {file.name for file in (out, overlay, page)}
+        if self.video.resolve() in (overlay.resolve(), page.resolve(), out.resolve()):
+            raise InputError(f"{self.video}: would be overwritten; give OUT another name")
         config = RetargetConfig(self.midi, self.points, self.offset, self.hand_model, self.align)
         with bars() as tell:
             made = retarget(self.video, config, tell)
-            out.parent.mkdir(parents=True, exist_ok=True)
-            if self.overlay:
-                write_overlay(made, out.with_suffix(".mp4"), tell)
-            write_summary(made, out.with_suffix(".html"))
-            made.demonstration.save(out)
+            # Whoever interrupts this finds no picture of a demonstration that is not there.
+            with staged(out.parent, ours) as folder:
+                if self.overlay:
+                    write_overlay(made, folder / overlay.name, tell)
+                write_summary(made, folder / page.name)
+                made.demonstration.save(folder / out.name)
         quality = made.demonstration.quality
         print(f"keyboard: {quality['keyboard']}")
         print(f"both hands seen in {quality['both_hands_found']:.1%} of the frames")
         print(f"notes: {quality['notes']}, fingers guessed: {quality['notes_guessed']}")
         for remark in made.remarks:
             print(f"note: {remark}")
-        print(f"look: {out.with_suffix('.html')}")
+        print(f"look: {page}")
         print(f"play it: pianomime play {out}")

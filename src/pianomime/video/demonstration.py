@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.archive import read_archive
 from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.music import Score
@@ -111,32 +111,25 @@ class Demonstration:
         """Read what `save` wrote.
 
         Raises:
-            InputError: no such file, no demonstration, or one of a version that we do not know.
+            OSError: there is no such file, or it cannot be read.
+            InputError: no demonstration, or one of a version that we do not know.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = dict(file)
-            version = int(arrays["demonstration_version"])
-            if version != _VERSION:
-                raise InputError(
-                    f"{path}: a demonstration of version {version}; this program reads {_VERSION}"
-                )
-            return cls(
-                Score(
-                    **{name: arrays[f"score_{name}"] for name in _SCORE},
-                    title=str(arrays["score_title"]),
-                ),
-                FingertipPlan(**{name: arrays[f"plan_{name}"] for name in _PLAN}),
-                str(arrays["source"]),
-                arrays["homography"],
-                json.loads(str(arrays["quality"])),
-            )
-        except InputError:
-            raise
-        except FileNotFoundError:
-            raise InputError(f"{path}: does not exist") from None
-        except (KeyError, ValueError, TypeError, EOFError, OSError, zipfile.BadZipFile) as error:
-            raise InputError(f"{path}: not a demonstration ({error})") from error
+        return read_archive(
+            path, "a demonstration", ("demonstration_version", _VERSION), cls._from_arrays
+        )
+
+    @classmethod
+    def _from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Demonstration:
+        return cls(
+            Score(
+                **{name: arrays[f"score_{name}"] for name in _SCORE},
+                title=str(arrays["score_title"]),
+            ),
+            FingertipPlan(**{name: arrays[f"plan_{name}"] for name in _PLAN}),
+            str(arrays["source"]),
+            arrays["homography"],
+            json.loads(str(arrays["quality"])),
+        )
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,15 @@ class Drawing:
                     pen.polygon(_corners(outline), fill=(*colour, 110), outline=(*colour, 255))
                     foot = (outline[2] + outline[3]) / 2
                     label = f"{'L' if hand == LEFT else 'R'}{finger + 1}"
-                    pen.text(tuple(foot), label, fill=(255, 255, 255), anchor="ms", stroke_width=1)
+                    pen.text(
+                        tuple(foot),
+                        label,
+                        fill=(255, 255, 255),
+                        anchor="ms",
+                        font_size=5 * radius,
+                        stroke_width=2,
+                        stroke_fill=(0, 0, 0),
+                    )
             mark = colour if found[hand] else _LOST
             wrist = tuple(places[hand, 0])
             for finger in range(1, 6):

@@ -6,6 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.video.ahead import ahead
 
 _WIDEST = 1280
 """Larger pictures are shrunk to this size [pixels]: hands and keys are plain enough in them."""
@@ -64,6 +66,7 @@ class Film:
                 raise InputError(f"{self.path}: no picture in it can be read")
             self._turns = round(getattr(first, "rotation", 0) / 90) % 4
             self._start = first.time or 0.0
+            self._timed = first.time is not None
             size = (first.width, first.height)
             self.width, self.height = size if self._turns % 2 == 0 else size[::-1]
             self.zoom = max(1.0, max(size) / _WIDEST)
@@ -71,18 +74,30 @@ class Film:
             self.seconds = _length(container, stream)
             self._interval = 1 / float(stream.average_rate or stream.guessed_rate or 30)
 
-    def frames(self, rate: float) -> Iterator[Frame]:
-        """The frame nearest to 0, 1, 2, ... / rate seconds, to the end of the video.
+    def frames(self, rate: float, first: int = 0) -> Iterator[Frame]:
+        """The frame nearest to first, first + 1, ... / rate seconds, to the end of the video.
 
         Where the video has no frame near a moment (variable frame rates, dropped frames), the one
-        that is shown then is given again. A damaged end is left out, with a warning.
+        that is shown then is given again. A damaged end is left out, with a warning. A few frames
+        are read ahead in a thread of their own.
+
+        Args:
+            rate: frames a second.
+            first: the frame to begin with; what lies before it is skipped, not read.
         """
-        due = 0
+        return ahead(self._frames(rate, first))
+
+    def _frames(self, rate: float, due: int) -> Iterator[Frame]:
         before: tuple[float, Any] | None = None
         last: Frame | None = None
         with self._open() as container:
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
+            # Without times in the file only counting from its beginning tells which frame it is.
+            if due and self._timed:
+                goal = self._start + due / rate - self._interval
+                with suppress(av.error.FFmpegError):
+                    container.seek(int(goal / stream.time_base), stream=stream)
             for count, frame in enumerate(self._decode(container, stream)):
                 at = count * self._interval if frame.time is None else frame.time - self._start
                 while before is not None and due / rate < at:

@@ -9,27 +9,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import ModuleType, TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.video.sightings import Sighting
 
 _POINTS = [0, 4, 8, 12, 16, 20]
 """MediaPipe's numbers of the wrist and the five fingertips, thumb first."""
-
-
-class Sighting(NamedTuple):
-    """A hand in one frame.
-
-    Attributes:
-        points: (6, 2) wrist and fingertips, 0..1 of the picture's width and height.
-        right: how sure MediaPipe is that it is a right hand, 0..1.
-    """
-
-    points: NDArray[np.float64]
-    right: float
 
 
 class HandDetector:

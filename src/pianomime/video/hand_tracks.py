@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from itertools import permutations
 
 import numpy as np
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from pianomime.plan import LEFT, RIGHT
-from pianomime.video.hand_detector import Sighting
 from pianomime.video.plane import Plane
+from pianomime.video.sightings import Sighting, Sightings
 from pianomime.video.stretches import stretches
 
 _SAME_HAND = 0.05
@@ -60,7 +61,7 @@ class HandTracks:
 
 
 def follow(
-    sightings: Sequence[Sequence[Sighting]], size: tuple[int, int], plane: Plane
+    sightings: Iterable[Iterable[Sighting]], size: tuple[int, int], plane: Plane
 ) -> HandTracks:
     """Decide over the whole clip which sighting is which hand, then repair.
 
@@ -69,19 +70,26 @@ def follow(
         size: width and height of the picture [pixels].
         plane: of that picture.
     """
-    seen = [
-        _without_doubles([(plane.to_world(each.points * size), each.right) for each in frame])
-        for frame in sightings
-    ]
-    doubles = sum(map(len, sightings)) - sum(map(len, seen))
+    seen = Sightings()
+    doubles = 0
+    for frame in sightings:
+        hands = [Sighting(plane.to_world(each.points * size), each.right) for each in frame]
+        single = _without_doubles(hands)
+        doubles += len(hands) - len(single)
+        seen.append(single)
     # In a mirror every left hand looks like a right one; who sits where tells.
     mirrored = _seen_in_mirror(seen)
-    chosen, ghosts, swaps = _assign(seen, mirrored)
+    chosen = _assign(seen, mirrored)
     points = np.full((len(seen), 2, 6, 2), np.nan)
-    for frame, hands in enumerate(chosen):
-        for hand, which in enumerate(hands):
+    ghosts = swaps = 0
+    for number, (hands, pick) in enumerate(zip(seen, chosen, strict=True)):
+        swapped = False
+        for hand, which in enumerate(pick):
             if which >= 0:
-                points[frame, hand] = seen[frame][which][0]
+                points[number, hand] = hands[which].points
+                swapped |= ((hands[which].right > 0.5) != (hand == RIGHT)) != mirrored
+        swaps += swapped
+        ghosts += len(hands) - sum(which >= 0 for which in pick)
     found = np.isfinite(points).all(axis=(2, 3))
     mended = np.zeros(points.shape[:3], bool)
     for hand in (LEFT, RIGHT):
@@ -89,73 +97,66 @@ def follow(
     return HandTracks(points, found, mended & found[..., None], ghosts + doubles, swaps)
 
 
-_Seen = tuple[NDArray[np.float64], float]
-
-
-def _without_doubles(hands: list[_Seen]) -> list[_Seen]:
-    """Points (6, 2) [m] and rightness of each hand; the surer one where it was seen twice."""
-    kept: list[_Seen] = []
-    for hand in sorted(hands, key=lambda each: -abs(each[1] - 0.5)):
-        if not np.isfinite(hand[0]).all():
+def _without_doubles(hands: list[Sighting]) -> list[Sighting]:
+    """Those of the hands, in the world, that are not another one again; the surer ones."""
+    kept: list[Sighting] = []
+    for hand in sorted(hands, key=lambda each: -abs(each.right - 0.5)):
+        if not np.isfinite(hand.points).all():
             continue
-        far = [np.linalg.norm(hand[0] - other[0], axis=1).mean() > _SAME_HAND for other in kept]
+        far = [
+            np.linalg.norm(hand.points - other.points, axis=1).mean() > _SAME_HAND for other in kept
+        ]
         if all(far):
             kept.append(hand)
     return kept
 
 
-def _seen_in_mirror(seen: list[list[_Seen]]) -> bool:
+def _seen_in_mirror(seen: Sightings) -> bool:
     difference = 0.0
     for frame in seen:
         if len(frame) == 2:
-            left, right = sorted(frame, key=lambda hand: hand[0][:, 1].mean())
-            difference += right[1] - left[1]
+            left, right = sorted(frame, key=lambda hand: float(hand.points[:, 1].mean()))
+            difference += right.right - left.right
     return difference < 0
 
 
-def _assign(seen: list[list[_Seen]], mirrored: bool) -> tuple[list[tuple[int, int]], int, int]:
+@cache
+def _options(hands: int) -> tuple[tuple[int, int], ...]:
+    """Every way to take one of the hands for the left and one for the right, -1 for none."""
+    ways = permutations([*range(hands), -1, -1], 2)
+    return tuple(dict.fromkeys(way for way in ways if way[0] != way[1] or way[0] < 0))
+
+
+def _assign(seen: Sightings, mirrored: bool) -> list[tuple[int, int]]:
     """For each frame which sighting is left and which right, -1 for none: the cheapest history.
 
     A history remembers where it last saw each hand; of those that end alike one is kept.
     """
-    histories: dict[tuple[int, int], _History] = {(-1, -1): _History.start()}
-    back: list[dict[tuple[int, int], tuple[int, int]]] = []
+    histories = {0: _History.start()}
+    # For each frame and option, the number of the option before: in hours, bytes count.
+    back: list[bytes] = []
     for frame in seen:
-        options = [
-            (left, right)
-            for left, right in permutations([*range(len(frame)), -1, -1], 2)
-            if left != right or left < 0
-        ]
-        following: dict[tuple[int, int], _History] = {}
-        came_from: dict[tuple[int, int], tuple[int, int]] = {}
+        options = _options(len(frame))
+        following: dict[int, _History] = {}
+        came_from = bytearray(len(options))
         # Those far behind do not catch up.
-        leading = sorted(histories, key=lambda key: histories[key].cost)[:_HISTORIES]
-        for key in leading:
-            history = histories[key]
+        leading = sorted(histories, key=lambda number: histories[number].cost)[:_HISTORIES]
+        for before in leading:
+            history = histories[before]
             moves = history.moves(frame)
-            for option in dict.fromkeys(options):
+            for number, option in enumerate(options):
                 longer = history.after(frame, option, moves, mirrored)
-                if option not in following or longer.cost < following[option].cost:
-                    following[option], came_from[option] = longer, key
+                if number not in following or longer.cost < following[number].cost:
+                    following[number], came_from[number] = longer, before
         histories = following
-        back.append(came_from)
-    if not seen:
-        return [], 0, 0
-    here = min(histories, key=lambda key: histories[key].cost)
+        back.append(bytes(came_from))
+    here = min(histories, key=lambda number: histories[number].cost)
     chosen = []
-    for came_from in reversed(back):
-        chosen.append(here)
-        here = came_from[here]
+    for frame_number in reversed(range(len(seen))):
+        chosen.append(_options(len(seen[frame_number]))[here])
+        here = back[frame_number][here]
     chosen.reverse()
-    ghosts = swaps = 0
-    for frame, pick in zip(seen, chosen, strict=True):
-        ghosts += len(frame) - sum(which >= 0 for which in pick)
-        wrong = [
-            which >= 0 and ((frame[which][1] > 0.5) != (hand == RIGHT)) != mirrored
-            for hand, which in enumerate(pick)
-        ]
-        swaps += any(wrong)
-    return chosen, ghosts, swaps
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +169,7 @@ class _History:
     def start() -> _History:
         return _History(0.0, (None, None), (0, 0))
 
-    def moves(self, frame: list[_Seen]) -> list[list[float]]:
+    def moves(self, frame: list[Sighting]) -> list[list[float]]:
         """What it costs each hand to have gone to each sighting."""
         return [
             [
@@ -183,7 +184,7 @@ class _History:
 
     def after(
         self,
-        frame: list[_Seen],
+        frame: list[Sighting],
         option: tuple[int, int],
         moves: list[list[float]],
         mirrored: bool,

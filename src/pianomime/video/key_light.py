@@ -15,9 +15,15 @@ from pianomime.world.figures import BLACK, KEYS, key_centres
 ZONES = {
     "above the keys": (-0.088, -0.080),
     "far end": (-0.070, -0.055),
+    "between the black keys": (-0.050, -0.040),
 }
-"""World x from and to [m] of the patches, where hands do not hide them."""
+"""World x from and to [m] of the patches."""
+LIT = range(2)
+"""Numbers of those zones in which keys light up, and which hands do not hide. In the others keys
+that go down change their shade, and hands come and go."""
 
+_SOME = 2000
+"""Frames."""
 _HALF_WIDTH = np.where(BLACK, 0.004, 0.006)
 
 
@@ -42,30 +48,42 @@ class KeyLight:
         return np.where(self._inside[..., None], patches, 0).astype(np.uint8)
 
 
-def glow(light: NDArray[np.uint8], zone: int, colourful: bool) -> NDArray[np.float32]:
-    """How much each key of a zone stands out from its usual look, about 0..1.
+class Glow:
+    """How much the keys stand out from their usual look in one zone, a key at a time.
 
-    Args:
-        light: (T, zones, 88, 3), what `KeyLight.read` gives for each frame.
-        zone: which of `ZONES`.
-        colourful: go by how colourful a patch is, rather than by any change of colour.
-
-    Returns:
-        (T, 88) float32.
+    A key at a time, because of hours of video all keys at once would fill the memory.
     """
-    seen = light[:, zone].astype(np.float32) / 255
-    # Every eleventh frame will do to know what is usual.
-    usual = np.median(seen[:: max(1, len(seen) // 2000)], axis=0)
-    if colourful:
-        change = np.ptp(seen, axis=2) - np.ptp(usual, axis=1)
-    else:
-        change = np.abs(seen - usual).mean(axis=2)
-    change = np.maximum(change, 0)
-    strong = float(np.percentile(change, 99.5))
-    return np.asarray(change / max(strong, 0.02), np.float32)
 
+    def __init__(self, light: NDArray[np.uint8], zone: int, colourful: bool) -> None:
+        """Find out what is usual.
 
-def standing_out(light: NDArray[np.float32], share: float = 0.5) -> NDArray[np.float32]:
-    """(T, 88) glow less a share of the brighter neighbour's, for light spreads to neighbours."""
-    padded = np.pad(light, ((0, 0), (1, 1)))
-    return np.asarray(light - share * np.maximum(padded[:, :-2], padded[:, 2:]), np.float32)
+        Args:
+            light: (T, zones, 88, 3), what `KeyLight.read` gives for each frame.
+            zone: which of `ZONES`.
+            colourful: go by how colourful a patch is, rather than by any change of colour.
+        """
+        self._light = light[:, zone]
+        self._colourful = colourful
+        # Some frames will do to know what is usual, and what is strong.
+        some = self._light[:: max(1, len(light) // _SOME)]
+        self._usual = np.asarray(np.median(some, axis=0), np.float32)
+        self._strong = max(float(np.percentile(self._change(some, self._usual), 99.5)), 5.0)
+
+    def of(self, key: int) -> NDArray[np.float32]:
+        """(T,) about 0..1."""
+        if not 0 <= key < KEYS:
+            return np.zeros(len(self._light), np.float32)
+        return self._change(self._light[:, key], self._usual[key]) / np.float32(self._strong)
+
+    def standing_out(self, key: int, share: float = 0.5) -> NDArray[np.float32]:
+        """(T,) glow less a share of the brighter neighbour's, for light spreads to neighbours."""
+        beside = np.maximum(self.of(key - 1), self.of(key + 1))
+        return np.asarray(self.of(key) - share * beside, np.float32)
+
+    def _change(self, light: NDArray[np.uint8], usual: NDArray[np.float32]) -> NDArray[np.float32]:
+        seen = light.astype(np.float32)
+        if self._colourful:
+            change = np.ptp(seen, axis=-1) - np.ptp(usual, axis=-1)
+        else:
+            change = np.abs(seen - usual).mean(axis=-1)
+        return np.asarray(np.maximum(change, 0))

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +13,7 @@ from scipy.signal import fftconvolve
 
 from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
-from pianomime.video.key_light import ZONES, glow, standing_out
+from pianomime.video.key_light import LIT, Glow
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -51,26 +54,26 @@ def estimate_offset(
         light: (T, zones, 88, 3), see `KeyLight`.
         given: the offset, if it is known: then only how well it fits is found out.
     """
-    near = touching(tracks.points)
-    touched, counts, lags = _correlate(near > np.exp(-1.0), score)
-    evidence, _, _ = _correlate(near, score)
+    points = tracks.points
+    touched, counts, lags = _correlate(
+        lambda key: touching(points, key) > np.exp(-1.0), len(points), score
+    )
+    evidence, _, _ = _correlate(lambda key: touching(points, key), len(points), score)
     best_light, best_peak = np.zeros(len(lags)), 0.0
-    for zone in range(len(ZONES)):
-        for colourful in (True, False):
-            shine = np.clip(standing_out(glow(light, zone, colourful)), 0, 1)
-            # What comes on at a note, and was not on just before.
-            rise = np.maximum(shine[1:] - shine[:-1], 0)
-            rise = np.pad(rise, ((1, 0), (0, 0)))
-            found, _, _ = _correlate(rise, score)
-            peak = float(found.max() - np.median(found))
-            if peak > best_peak:
-                best_light, best_peak = found, peak
+    for zone, colourful in product(LIT, (True, False)):
+        rise = partial(_rise, Glow(light, zone, colourful))
+        found, _, _ = _correlate(rise, len(points), score)
+        peak = float(found.max() - np.median(found))
+        if peak > best_peak:
+            best_light, best_peak = found, peak
     total = evidence + best_light
     length = score.onset.max() * RATE - score.onset.min() * RATE
     first = lags + score.onset.min() * RATE
-    together = np.minimum(first + length, len(near)) - np.maximum(first, 0)
-    possible = (together >= _INSIDE * min(length, len(near))) & (counts > 0)
-    at = int(np.argmax(np.where(possible, total, -np.inf)))
+    together = np.minimum(first + length, len(points)) - np.maximum(first, 0)
+    possible = (together >= _INSIDE * min(length, len(points))) & (counts > 0)
+    # Music repeats itself: that many notes fit says more than that a few fit very well.
+    sure = (total - np.median(total[possible])) * np.sqrt(counts)
+    at = int(np.argmax(np.where(possible, sure, -np.inf)))
     if given is None:
         seconds = (lags[at] + _vertex(total, at)) / RATE
     else:
@@ -79,24 +82,35 @@ def estimate_offset(
     return Offset(float(seconds), float(touched[at]), float(np.median(touched[possible])))
 
 
+def _rise(glow: Glow, key: int) -> NDArray[np.float32]:
+    """(T,) how much of a key comes on in each frame that was not on just before."""
+    shine = np.clip(glow.standing_out(key), 0, 1)
+    return np.maximum(np.diff(shine, prepend=shine[:1]), 0)
+
+
 def _correlate(
-    value: NDArray[np.float32] | NDArray[np.bool_], score: Score
+    value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]], frames: int, score: Score
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Mean of value (T, 88) at the onsets of all notes within the video, for every lag.
+    """Mean of a value at the onsets of all notes within the video, for every lag.
+
+    Args:
+        value: gives (T,) of a key.
+        frames: T.
+        score: the notes.
 
     Returns:
         The means (L,), how many notes fall within the video (L,), and the lags (L,) [frames].
     """
     onset = np.floor(score.onset * RATE + 0.5).astype(np.int64)
     length = int(onset.max(initial=0)) + 1
-    total = np.zeros(len(value) + length - 1)
+    total = np.zeros(frames + length - 1)
     for key in range(KEYS):
         struck = onset[score.key == key]
         if len(struck):
             train = np.bincount(struck, minlength=length).astype(np.float64)
-            total += fftconvolve(value[:, key].astype(np.float64), train[::-1])
-    counts = np.rint(fftconvolve(np.ones(len(value)), np.bincount(onset, minlength=length)[::-1]))
-    lags = np.arange(-(length - 1), len(value))
+            total += fftconvolve(value(key).astype(np.float64), train[::-1])
+    counts = np.rint(fftconvolve(np.ones(frames), np.bincount(onset, minlength=length)[::-1]))
+    lags = np.arange(-(length - 1), frames)
     return total / np.maximum(counts, 1), counts, lags
 
 

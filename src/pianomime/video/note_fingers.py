@@ -68,7 +68,7 @@ def find_note_fingers(score: Score, points: NDArray[np.float64]) -> NoteFingers:
     until = np.zeros((1, _FINGERS), np.int64)
     since = np.full((1, _FINGERS), -1)
     on_key = np.full((1, _FINGERS), -1)
-    history: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
+    history: list[tuple[NDArray[np.uint8], NDArray[np.uint8]]] = []
     finger = np.arange(_FINGERS)
     hand = finger // 5
     # Fingers that should lie toward the treble, and toward the bass, of each finger.
@@ -99,12 +99,13 @@ def find_note_fingers(score: Score, points: NDArray[np.float64]) -> NoteFingers:
         since[row, pick] = first
         until[row, pick] = np.maximum(end, first + 1)
         on_key[row, pick] = key
-        history.append((parent, pick))
+        # Both are less than 256, and there may be a hundred thousand notes.
+        history.append((parent.astype(np.uint8), pick.astype(np.uint8)))
     picked = np.zeros(len(score), np.int64)
     row_now = int(np.argmin(cost))
-    for note, (parent, pick) in zip(order[::-1], reversed(history), strict=True):
-        picked[note] = pick[row_now]
-        row_now = int(parent[row_now])
+    for note, (parents, picks) in zip(order[::-1], reversed(history), strict=True):
+        picked[note] = picks[row_now]
+        row_now = int(parents[row_now])
     stop = _let_go(picked, frames, order)
     return NoteFingers(
         (picked // 5).astype(np.int8),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.music import Score
+from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
-from pianomime.video.key_light import ZONES, glow, standing_out
+from pianomime.video.key_light import LIT, ZONES, Glow
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -20,10 +21,27 @@ _SHORTEST = 2
 """Frames."""
 _FALSE = 2.0
 """How much worse a note that no finger plays is than a note that one does is good."""
+_DOUBT = 1.4
+"""How many times as many notes keys must seem to play by going down as by lighting up, for the
+first to be believed."""
 _VELOCITY = 80
 
 
-def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> tuple[Score, float]:
+class ReadNotes(NamedTuple):
+    """Notes, and how they were found.
+
+    Attributes:
+        score: the notes, without pedal.
+        touched: share of them that a finger is on.
+        lit: their keys light up; otherwise they only go down, and many are missed.
+    """
+
+    score: Score
+    touched: float
+    lit: bool
+
+
+def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> ReadNotes:
     """Find the notes that agree best with the fingers.
 
     The places where a note may show, and how strong a sign is asked for, are those that give the
@@ -33,21 +51,19 @@ def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> tupl
         light: (T, zones, 88, 3), see `KeyLight`.
         tracks: the hands.
         title: of the score.
-
-    Returns:
-        The score, without pedal, and the share of its notes that a finger is on.
     """
-    near = touching(tracks.points) > _TOUCHED
-    best: tuple[float, NDArray[np.int64]] = (0.0, np.zeros((0, 3), np.int64))
-    for zone, colourful in product(range(len(ZONES)), (True, False)):
-        shine = glow(light, zone, colourful)
-        for share in _SHARES:
-            stands = standing_out(shine, share)
-            for level in _LEVELS:
-                notes = _runs(stands, level)
-                worth = _worth(notes, near)
-                if worth > best[0]:
-                    best = worth, notes
+    near = np.stack([touching(tracks.points, key) > _TOUCHED for key in range(KEYS)], axis=1)
+    best: tuple[float, NDArray[np.int64], bool] = (0.0, np.zeros((0, 3), np.int64), True)
+    for zone, colourful, share in product(range(len(ZONES)), (True, False), _SHARES):
+        glow = Glow(light, zone, colourful)
+        for notes in _runs(glow, share):
+            worth = _worth(notes, near)
+            if zone not in LIT:
+                # Hands and their shadows change a key as much as going down does.
+                notes = notes[_touched(notes, near)]
+                worth /= _DOUBT
+            if worth > best[0]:
+                best = worth, notes, zone in LIT
     notes = best[1]
     touched = _touched(notes, near)
     score = Score(
@@ -57,23 +73,27 @@ def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> tupl
         velocity=np.full(len(notes), _VELOCITY),
         title=title,
     )
-    return score, float(touched.mean()) if len(notes) else 0.0
+    return ReadNotes(score, float(touched.mean()) if len(notes) else 0.0, best[2])
 
 
-def _runs(stands: NDArray[np.float32], level: float) -> NDArray[np.int64]:
-    """(N, 3) key, first frame and end of what rises above a level, down to half of it."""
-    notes = []
-    for key in range(stands.shape[1]):
-        value = stands[:, key]
-        lit = np.concatenate(([False], value > level / 2, [False]))
-        edges = np.flatnonzero(np.diff(lit.astype(np.int8)))
-        for first, end in edges.reshape(-1, 2).tolist():
-            if end - first < _SHORTEST or value[first:end].max() <= level:
-                continue
-            # It begins when it is bright, not when the glow of what comes begins.
-            bright = first + int(np.argmax(value[first:end] > level))
-            notes.append((key, bright, end))
-    return np.array(notes, np.int64).reshape(-1, 3)
+def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:
+    """For each of `_LEVELS` (N, 3) key, first frame and end of what rises above it.
+
+    A note lasts until it is down to half the level.
+    """
+    found: list[list[tuple[int, int, int]]] = [[] for _ in _LEVELS]
+    for key in range(KEYS):
+        value = glow.standing_out(key, share)
+        for level, notes in zip(_LEVELS, found, strict=True):
+            lit = np.concatenate(([False], value > level / 2, [False]))
+            edges = np.flatnonzero(np.diff(lit.astype(np.int8)))
+            for first, end in edges.reshape(-1, 2).tolist():
+                if end - first < _SHORTEST or value[first:end].max() <= level:
+                    continue
+                # It begins when it is bright, not when the glow of what comes begins.
+                bright = first + int(np.argmax(value[first:end] > level))
+                notes.append((key, bright, end))
+    return [np.array(notes, np.int64).reshape(-1, 3) for notes in found]
 
 
 def _touched(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -51,7 +51,7 @@ def write_overlay(
                 stream = film.add_stream("libx264", rate=round(RATE))
                 stream.height, stream.width = drawn.shape[:2]
                 stream.pix_fmt = "yuv420p"
-                stream.options = {"crf": "23", "preset": "veryfast"}
+                stream.options = {"crf": "26", "preset": "superfast"}
             picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(drawn), format="rgb24")
             picture.pts, picture.time_base = number, Fraction(1, round(RATE))
             film.mux(stream.encode(picture))

@@ -30,7 +30,9 @@ _NEVER_SEEN = 0.1
 """[m] z from which a point stands where the robot rests."""
 _JUMP = 0.10
 """[m] A point this far from where the frames before and after have it was seen wrongly."""
-_TIPS = 36
+_WIDTHS = (212, 184)
+"""Columns of the high-level data set's state and action."""
+_TIPS, _FINGERS = 36, 10
 
 
 def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demonstration, int]]:
@@ -189,25 +191,33 @@ def _zarr(folder: Path) -> list[_Clip]:
         zarr: Any = importlib.import_module("zarr")
     except ImportError as error:
         raise InputError(
-            f"{folder}: reading it needs the package zarr: pip install zarr"
+            f"{folder}: reading it needs the package zarr: pip install 'pianomime[video]'"
         ) from error
+    wanted = f"{folder}: not PianoMime's high-level data set"
     try:
-        root = zarr.open(str(folder), mode="r")
+        root = zarr.open_group(str(folder), mode="r")
         group, meta = (root.get(name, root) for name in ("data", "meta"))
-        # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers.
-        action = np.asarray(group["action"])
+        widths = tuple(group[name].shape[1] for name in ("state", "action"))
+        if widths != _WIDTHS:
+            raise InputError(f"{wanted}: state and action have {widths} columns, not {_WIDTHS}")
+        # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers; what follows are
+        # those of the frames to come.
+        action = np.asarray(group["action"][:, : _TIPS + _FINGERS])
         ends = np.asarray(meta["episode_ends"]).astype(np.int64)
-    except (KeyError, ValueError, OSError, TypeError) as error:
-        raise InputError(f"{folder}: not PianoMime's high-level data set ({error})") from error
-    if action.ndim != 2 or action.shape[1] < _TIPS + 10:
-        raise InputError(f"{folder}: not PianoMime's high-level data set")
+    except InputError:
+        raise
+    # A damaged store raises what its codecs and its metadata happen to raise.
+    except (LookupError, ValueError, OSError, TypeError, AttributeError, RuntimeError) as error:
+        raise InputError(f"{wanted} ({error})") from error
+    if not len(ends) or (np.diff(ends, prepend=-1) <= 0).any() or ends[-1] != len(action) - 1:
+        raise InputError(f"{wanted}: its clips do not end where its {len(action)} rows do")
     clips: list[_Clip] = []
     first = 0
     for end in ends:
         rows = action[first : end + 1]
         first = int(end) + 1
         tips = rows[:, :_TIPS].reshape(-1, 2, 6, 3).astype(np.float64)
-        keys = np.rint(rows[:, _TIPS : _TIPS + 10] * 89).astype(np.int64) - 1
+        keys = np.rint(rows[:, _TIPS:] * 89).astype(np.int64) - 1
         goal = np.zeros((len(rows), KEYS), bool)
         frame, _ = np.nonzero((keys >= 0) & (keys < KEYS))
         goal[frame, keys[(keys >= 0) & (keys < KEYS)]] = True

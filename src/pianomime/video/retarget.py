@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.music import Score
+from pianomime.music import KEYS, Score
 from pianomime.plan import LEFT
 from pianomime.video.align import Rule, align
 from pianomime.video.demonstration import Demonstration, on_grid
 from pianomime.video.film import Film
-from pianomime.video.hand_detector import HandDetector, Sighting
+from pianomime.video.hand_detector import HandDetector
 from pianomime.video.hand_model import find_hand_model
 from pianomime.video.hand_tracks import HandTracks, follow, poorly_seen
 from pianomime.video.key_light import ZONES, KeyLight
@@ -27,6 +27,7 @@ from pianomime.video.note_reading import read_notes
 from pianomime.video.parallax import without_parallax
 from pianomime.video.plane import Plane
 from pianomime.video.points import read_points
+from pianomime.video.sightings import Sightings
 from pianomime.video.stretches import RATE, stretches
 
 Tell = Callable[[str, int, int], None]
@@ -181,7 +182,7 @@ class _Watched:
         size: width and height of the pictures [pixels].
     """
 
-    sightings: list[list[Sighting]]
+    sightings: Sightings
     light: list[NDArray[np.uint8]]
     size: tuple[int, int]
 
@@ -189,16 +190,20 @@ class _Watched:
 def _watch(film: Film, planes: list[Plane], model: Path, tell: Tell) -> _Watched:
     size = (round(film.width / film.zoom), round(film.height / film.zoom))
     readers = [KeyLight(plane, size) for plane in planes]
-    sightings: list[list[Sighting]] = []
-    light: list[list[NDArray[np.uint8]]] = [[] for _ in planes]
+    sightings = Sightings()
+    # Bytes grow in place; a list of arrays would take twice as much, and as much again at its end.
+    light = [bytearray() for _ in planes]
     total = round(film.seconds * RATE)
     with HandDetector(model) as detector:
         for number, frame in enumerate(film.frames(RATE)):
             sightings.append(detector.detect(frame.picture, round(number * 1000 / RATE)))
             for reader, kept in zip(readers, light, strict=True):
-                kept.append(reader.read(frame.picture))
+                kept += reader.read(frame.picture).tobytes()
             tell("hands", number + 1, max(total, number + 1))
-    return _Watched(sightings, [np.array(kept) for kept in light], size)
+    shape = (len(sightings), len(ZONES), KEYS, 3)
+    return _Watched(
+        sightings, [np.frombuffer(kept, np.uint8).reshape(shape) for kept in light], size
+    )
 
 
 def _best_way(
@@ -228,11 +233,16 @@ def _check_hands(video: Path, tracks: HandTracks, remarks: list[str]) -> None:
 
 def _hidden(light: NDArray[np.uint8]) -> list[str]:
     """Remarks on when the keyboard does not look like itself: after a cut, or a move."""
-    level = light[:, list(ZONES).index("far end")].mean(axis=2)
-    usual = np.median(level[:: max(1, len(level) // 2000)], axis=0)
+    far_end = light[:, list(ZONES).index("far end")]
+    usual = np.median(far_end[:: max(1, len(light) // 2000)].mean(axis=2), axis=0)
     usual = usual - usual.mean()
-    level = level - level.mean(axis=1, keepdims=True)
-    likeness = level @ usual / (np.linalg.norm(level, axis=1) * np.linalg.norm(usual) + 1e-9)
+    likeness = np.empty(len(light))
+    # In blocks: hours at once take much memory.
+    for first in range(0, len(light), 10_000):
+        level = far_end[first : first + 10_000].mean(axis=2)
+        level = level - level.mean(axis=1, keepdims=True)
+        scale = np.linalg.norm(level, axis=1) * np.linalg.norm(usual) + 1e-9
+        likeness[first : first + 10_000] = level @ usual / scale
     return [
         f"the keyboard is not where it was, or hidden, from {first:.1f} s to {end:.1f} s"
         for first, end in stretches(likeness < 0.5)
@@ -251,18 +261,26 @@ def _score(
     """What is played, timed by the video, and figures about it."""
     seconds = len(tracks) / RATE
     if score is None or offset is None:
-        read, touched = read_notes(light, tracks, film.path.stem)
-        if not len(read):
+        read = read_notes(light, tracks, film.path.stem)
+        if not len(read.score):
             raise InputError(
                 f"{film.path}: no keys are seen going down or lighting up; name what is played "
                 "with --midi"
             )
-        if touched < _FEW_TOUCHED:
+        if not read.lit:
             remarks.append(
-                f"the notes are read off the video and doubtful: {touched:.0%} have a finger on "
-                "their key"
+                "no keys light up: the notes are read off keys that change their shade when they "
+                "go down, and many are missed (a MIDI file would tell)"
             )
-        return on_grid(read), {"notes_from": "video", "notes_touched": round(touched, 4)}
+        if read.touched < _FEW_TOUCHED:
+            remarks.append(
+                f"the notes are read off the video and doubtful: {read.touched:.0%} have a finger "
+                "on their key"
+            )
+        return on_grid(read.score), {
+            "notes_from": "video, from keys that " + ("light up" if read.lit else "go down"),
+            "notes_touched": round(read.touched, 4),
+        }
     if config.offset is None and offset.touched < _TOO_FEW_TOUCHED:
         raise InputError(
             f"{config.midi} is not what is played in {film.path}: at best {offset.touched:.0%} of "

@@ -94,19 +94,16 @@ def _pictures(made: Retargeted) -> list[NDArray[np.uint8]]:
     finger_key = made.demonstration.plan.finger_key
     count = min(len(finger_key), len(made.tracks))
     busy = (finger_key[:count] >= 0).sum(axis=(1, 2))
-    wanted = {
-        int(part[busy[part].argmax()])
-        for part in np.array_split(np.arange(count), _PICTURES)
-        if len(part)
-    }
     drawing = Drawing(made.plane)
     drawn = []
-    for number, frame in enumerate(made.film.frames(RATE)):
-        if number in wanted:
+    for part in np.array_split(np.arange(count), _PICTURES):
+        if not len(part):
+            continue
+        number = int(part[busy[part].argmax()])
+        frame = next(made.film.frames(RATE, number), None)
+        if frame is not None:
             points, found = made.tracks.points[number], made.tracks.found[number]
             drawn.append(drawing.draw(frame.picture, points, found, finger_key[number]))
-        if number >= max(wanted):
-            break
     return drawn
 
 

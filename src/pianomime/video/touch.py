@@ -15,8 +15,11 @@ _NEAR = 0.007
 _REACH = 0.010
 """[m] that a fingertip may seem to lie in front of its key: nails and parallax."""
 
+_BLOCK = 10_000
+"""Frames."""
 
-def misfit(points: NDArray[np.float64], key: NDArray[np.int64]) -> NDArray[np.float64]:
+
+def misfit(points: NDArray[np.float64], key: NDArray[np.int64] | np.int64) -> NDArray[np.float64]:
     """How badly fingertips fit keys, in squares of about a third of a key's width.
 
     Args:
@@ -29,17 +32,16 @@ def misfit(points: NDArray[np.float64], key: NDArray[np.int64]) -> NDArray[np.fl
     return np.asarray((beside / _NEAR) ** 2 + (before / _NEAR) ** 2)
 
 
-def touching(points: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(T, 88) how well the best of all fingertips fits each key, 0..1.
+def touching(points: NDArray[np.float64], key: int) -> NDArray[np.float32]:
+    """(T,) how well the best of all fingertips fits a key, 0..1.
 
     Args:
         points: (T, 2, 6, 2) as in `HandTracks`.
+        key: 0..87.
     """
-    tips = points[:, :, 1:].reshape(len(points), 10, 1, 2)
-    keys = np.arange(88)
-    best = np.empty((len(points), 88), np.float32)
-    # In blocks: an hour's worth at once would not fit in memory.
-    for first in range(0, len(points), 2000):
-        part = slice(first, first + 2000)
-        best[part] = np.exp(-misfit(tips[part], keys).min(axis=1))
+    best = np.empty(len(points), np.float32)
+    # In blocks: hours at once take much memory.
+    for first in range(0, len(points), _BLOCK):
+        part = slice(first, first + _BLOCK)
+        best[part] = np.exp(-misfit(points[part, :, 1:], np.int64(key)).min(axis=(1, 2)))
     return best

@@ -1,0 +1,132 @@
+"""How much memory `pianomime retarget` takes for videos of hours.
+
+    python benchmarks/long_video.py --hours 0.5 1 4
+
+A minute of made-up playing (640 x 360, 20 frames/s, keys light up) over and over, with a MIDI file
+and without. In MediaPipe's place stands one who knows where the hands were drawn; its own memory
+does not depend on the length, and is measured in 32 s of the real thing by `retarget.py`. Each
+length has a process of its own, whose greatest resident memory is told.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import av
+import numpy as np
+
+import common
+from pianomime.music import Score
+from pianomime.video import retarget as room
+from pianomime.video.overlay import write_overlay
+from pianomime.video.retarget import RetargetConfig, retarget
+from pianomime.video.summary import write_summary
+
+sys.path.append(str(common.ROOT / "tests" / "video"))
+
+SIZE = (640, 360)
+LOOP = 60.0
+
+
+def main() -> None:
+    options = common.parser("long_video", __doc__)
+    options.add_argument("--hours", type=float, nargs="+", default=[0.5, 1.0])
+    options.add_argument("--overlay", action="store_true", help="write the overlay, too")
+    given = options.parse_args()
+    facts = common.machine()
+    common.show_machine(facts)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for hours in given.hours:
+            for with_midi in (True, False):
+                queue: Any = multiprocessing.get_context("spawn").SimpleQueue()
+                work = multiprocessing.get_context("spawn").Process(
+                    target=_retarget, args=(Path(folder), hours, with_midi, given.overlay, queue)
+                )
+                work.start()
+                work.join()
+                if work.exitcode:
+                    raise SystemExit(f"{hours} h: exit code {work.exitcode}")
+                rows.append(queue.get())
+    common.table(list(rows[0]), [list(row.values()) for row in rows])
+    common.report(given.output, facts, {"long_video": rows})
+
+
+def _retarget(folder: Path, hours: float, with_midi: bool, overlay: bool, queue: Any) -> None:
+    import made_up_video as made_up
+
+    score = made_up.song(LOOP)
+    plan = made_up.plan_of(score)
+    plane = made_up.camera(SIZE)
+    short, video = folder / "short.mp4", folder / f"{hours}.mp4"
+    if not short.exists():
+        made_up.write(short, plane, SIZE, score, plan, made_up.times(LOOP, 20))
+    times = round(hours * 3600 / LOOP)
+    if not video.exists():
+        _repeat(short, video, times)
+    midi, model = folder / "song.mid", folder / "not-used.task"
+    _repeated(score, times).to_midi(midi)
+    model.touch()
+    points = np.tile(plan.fingertips[: round(20 * LOOP), :, :, :2], (times, 1, 1, 1))
+    detector = made_up.TrueHands(plane, SIZE, points)
+    before = _peak()
+    began = time.perf_counter()
+    config = RetargetConfig(midi=midi if with_midi else None, hand_model=model)
+    with patch.object(room, "HandDetector", lambda _: detector):
+        made = retarget(video, config)
+    write_summary(made, folder / "summary.html")
+    if overlay:
+        write_overlay(made, folder / "overlay.mp4")
+    made.demonstration.save(folder / "demo.npz")
+    queue.put(
+        {
+            "hours": hours,
+            "notes from": "MIDI file" if with_midi else "video",
+            "notes": len(made.demonstration.score),
+            "peak memory [MiB]": _peak(),
+            "of that before it began [MiB]": before,
+            "minutes": (time.perf_counter() - began) / 60,
+        }
+    )
+
+
+def _repeat(short: Path, video: Path, times: int) -> None:
+    """Write the same packets over and over: nothing is encoded anew."""
+    with av.open(str(short)) as source:
+        stream = source.streams.video[0]
+        packets = [packet for packet in source.demux(stream) if packet.dts is not None]
+        facts = [(packet.pts, packet.dts) for packet in packets]
+        length = round(LOOP / stream.time_base)
+        with av.open(str(video), "w") as film:
+            copy = film.add_stream_from_template(stream)
+            for number in range(times):
+                for packet, (pts, dts) in zip(packets, facts, strict=True):
+                    packet.stream, packet.time_base = copy, stream.time_base
+                    packet.pts, packet.dts = pts + number * length, dts + number * length
+                    film.mux(packet)
+
+
+def _repeated(score: Score, times: int) -> Score:
+    late = np.repeat(np.arange(times) * LOOP, len(score))
+    return Score(
+        np.tile(score.key, times),
+        np.tile(score.onset, times) + late,
+        np.tile(score.offset, times) + late,
+        np.tile(score.velocity, times),
+        title="over and over",
+    )
+
+
+def _peak() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+if __name__ == "__main__":
+    main()

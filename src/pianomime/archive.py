@@ -1,0 +1,51 @@
+"""Reading the .npz files that we wrote."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+
+_Made = TypeVar("_Made")
+
+
+def read_archive(
+    path: str | os.PathLike[str],
+    kind: str,
+    version: tuple[str, int],
+    make: Callable[[dict[str, NDArray[Any]]], _Made],
+) -> _Made:
+    """What a file of ours holds.
+
+    Args:
+        path: the .npz file.
+        kind: what it should be, such as "a performance".
+        version: name of the array that tells the version, and the version that we know.
+        make: makes it from the arrays.
+
+    Raises:
+        OSError: there is no such file, or it cannot be read.
+        InputError: it is not of the kind, or of a version that we do not know.
+    """
+    name, known = version
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+        found = int(arrays[name])
+        made = make(arrays) if found == known else None
+    except (FileNotFoundError, IsADirectoryError, PermissionError):
+        raise
+    except Exception as error:
+        # On damaged data zipfile, zlib and numpy raise all kinds of errors, and what they say,
+        # such as to allow pickles, is no advice for a user.
+        raise InputError(f"{path}: not {kind}, or a damaged one") from error
+    if made is None:
+        raise InputError(
+            f"{path}: {kind} of version {found}; this program reads {known}: make it anew"
+        )
+    return made
