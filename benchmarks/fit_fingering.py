@@ -23,11 +23,10 @@ from pianomime.plan.hand_cost import FingeringConfig
 _SECONDS = 30.0
 _FACTOR = 4.0
 # What decides between fingers; what a lost frame costs is no matter of taste.
-_FITTED = ("stretch", "strain", "travel_speed", "play", "hop_speed", "reuse") + (
-    "thumb_on_black",
-    "weak_finger",
+_FITTED = (
+    "stretch", "strain", "travel_speed", "hop_speed", "reuse", "thumb_on_black", "weak_finger",
     "crossed",
-)
+)  # fmt: skip
 
 
 def beginning(piece: Piece) -> Piece:

@@ -31,8 +31,8 @@ def check(score: Score, plan: FingertipPlan) -> None:
     assert pressing.sum() == plan.keys().sum()
     for note, (first, end) in enumerate(score.note_frames()):
         if plan.note_hand[note] >= 0 and first < end:
-            finger = plan.finger_key[first, plan.note_hand[note], plan.note_finger[note]]
-            assert finger == score.key[note]
+            finger = plan.finger_key[first:end, plan.note_hand[note], plan.note_finger[note]]
+            assert (finger == score.key[note]).any()
 
 
 @settings(max_examples=20, deadline=None)

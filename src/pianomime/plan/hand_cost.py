@@ -35,14 +35,12 @@ class FingeringConfig:
     """For a held note that is let go early, beside the frames it loses."""
     late: float = 1.5
     """For a note that begins late, beside the frames it loses."""
-    stretch: float = 6.0
+    stretch: float = 4.0
     """For two fingers at the limit of their reach; it grows with the fourth power."""
-    strain: float = 2.0
+    strain: float = 1.0
     """The same, but it grows with the square."""
     travel_speed: float = 0.5
     """[m/s] of a hand that costs 1 for each note it strikes (it grows with the square)."""
-    play: float = 0.015
-    """[m] that fingers reach sideways without the hand going along."""
     hop_speed: float = 0.3
     """[m/s] of a finger from key to key, relative to its hand, that costs 1."""
     reuse: float = 4.0
@@ -50,7 +48,7 @@ class FingeringConfig:
     thumb_on_black: float = 0.2
     weak_finger: float = 0.1
     """For ring and little finger on any note."""
-    crossed: float = 2.0
+    crossed: float = 0.5
     """For hands nearer than `apart`."""
     apart: float = 0.10
     """[m] between the middle fingers of the two hands."""
@@ -156,12 +154,7 @@ def hand_cost(
     centre = np.where(busy.any(axis=2), wish, before)
 
     travel, early, late = _travel_cost(
-        np.maximum(np.abs(centre - before) - config.play, 0.0),
-        fingers,
-        release,
-        strikes,
-        struck,
-        config,
+        np.abs(centre - before), fingers, release, strikes, struck, config
     )
     cost += travel
 
