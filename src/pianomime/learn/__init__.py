@@ -1,6 +1,6 @@
-"""Learning: environments, experts of one song, and the data they leave. Torch is imported here only.
+"""Learning: environments, experts of one song, and the data they leave; torch is only here.
 
-Importing it tells Gymnasium of `pianomime/Song-v0`, one environment and many:
+Importing it tells Gymnasium, where that is installed, of `pianomime/Song-v0`:
 
     import gymnasium
     import pianomime.learn
@@ -9,18 +9,13 @@ Importing it tells Gymnasium of `pianomime/Song-v0`, one environment and many:
     envs = gymnasium.make_vec("pianomime/Song-v0", num_envs=32, demonstration="DEMO.npz")
 """
 
-from pianomime.errors import InputError
+import contextlib
 
-try:
+with contextlib.suppress(ModuleNotFoundError):
     import gymnasium
-except ModuleNotFoundError as missing:
-    raise InputError(
-        "this needs the extra `train`: pip install 'pianomime[train]' "
-        f"(there is no {missing.name})"
-    ) from missing
 
-gymnasium.register(
-    "pianomime/Song-v0",
-    entry_point="pianomime.learn.song_env:SongEnv",
-    vector_entry_point="pianomime.learn.song_vector_env:SongVectorEnv",
-)
+    gymnasium.register(
+        "pianomime/Song-v0",
+        entry_point="pianomime.learn.song_env:SongEnv",
+        vector_entry_point="pianomime.learn.song_vector_env:SongVectorEnv",
+    )

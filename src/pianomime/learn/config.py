@@ -135,6 +135,8 @@ class SearchConfig:
     """Frames that are settled before looking ahead again."""
     ahead: int = 12
     """Frames that are looked ahead."""
+    sizes: tuple[float, ...] = (1.0, 1.5, 0.5)
+    """Size of the variations of the passes, in turn, as a factor of `RolloutConfig`'s."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ _BEST = ExpertConfig(method="search", env=EnvConfig(prior="dynamic"))
 PRESETS = {"paper": _PAPER, "best": _BEST}
 
 
-def preset(name: str) -> ExpertConfig:
+def preset_config(name: str) -> ExpertConfig:
     """A config by its name.
 
     Raises:

@@ -81,11 +81,14 @@ class Observer:
             for part, first, end in zip(self.parts, ends, ends[1:], strict=False)
         }
         hands = [Hand(side) for side in reversed(SIDES)]  # in the order of the joints
-        low, high = (np.concatenate([getattr(hand, end) for hand in hands]) for end in ("low", "high"))
+        low, high = (
+            np.concatenate([getattr(hand, end) for hand in hands]) for end in ("low", "high")
+        )
         self._joint_middle, self._joint_half = (low + high) / 2, (high - low) / 2
         low = np.concatenate([hand.ctrl_low for hand in hands])
         high = np.concatenate([hand.ctrl_high for hand in hands])
         self._ctrl_middle, self._ctrl_half = (low + high) / 2, (high - low) / 2
+        self._ctrl_width: NDArray[np.float64] = high - low
         self._frames = len(goal)
         silence = np.zeros((max(config.goal, 1), KEYS))
         self._goal = np.vstack([goal, silence]).astype(np.float32)
@@ -99,7 +102,7 @@ class Observer:
     @property
     def ctrl_range(self) -> NDArray[np.float64]:
         """(46,) width of each actuator's range [rad, m]."""
-        return 2 * self._ctrl_half
+        return self._ctrl_width
 
     def write(
         self,
@@ -119,7 +122,8 @@ class Observer:
             rows: (B, size) where to.
             ids: (n,) which rows.
             frames: (n,) the frame that is to be played next, 0..T.
-            joints, velocities: (n, 54) right, left [rad, m; a second].
+            joints: (n, 54) right, left [rad, m].
+            velocities: (n, 54) the same [rad/s, m/s].
             keys: (n, 88) how far each is down.
             tips: (n, 2, 5, 3) [m] left, right.
             prior: (n, 46) [rad, m].

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,12 +25,10 @@ from pianomime.learn.policy import ACTIVATIONS, PolicyTracker
 from pianomime.learn.run_folder import Evaluation, RunFolder
 from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_vec_env import SongVecEnv
+from pianomime.learn.tell import Tell
 from pianomime.learn.tensors import Arrays
 from pianomime.play import Player
 from pianomime.video.demonstration import DemonstrationPlanner
-
-Tell = Callable[[int, int, str], None]
-"""Called with the steps spent, the steps in all and a remark."""
 
 
 def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:

@@ -20,7 +20,8 @@ def tolerance(distance: NDArray[np.float64], bound: float, margin: float) -> NDA
 
     Args:
         distance: any shape, 0 or more.
-        bound, margin: in the unit of the distance.
+        bound: up to where nothing is lost, in the unit of the distance.
+        margin: from there to where 0.1 is left.
     """
     beyond = np.maximum(distance - bound, 0.0) / margin
     near: NDArray[np.float64] = np.exp(np.log(_AT_MARGIN) * beyond**2)
@@ -49,9 +50,7 @@ def press_reward(
     return reward
 
 
-def mimic_reward(
-    tips: NDArray[np.float64], targets: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def mimic_reward(tips: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
     """(B,) 0..1 for fingertips (B, 2, 5, 3) [m] over their targets (B, 2, 5, 3) [m].
 
     Heights do not count: a target's z says whether a key is to be pressed.

@@ -81,7 +81,9 @@ class RunFolder:
             raise InputError(f"{path}: holds a run on another song, {there.song.score.title}")
         if replace(there.config, steps=config.steps) != config:
             odd = ", ".join(_differences(to_json(there.config), to_json(config)))
-            raise InputError(f"{path}: holds a run with other settings ({odd}); name another folder")
+            raise InputError(
+                f"{path}: holds a run with other settings ({odd}); name another folder"
+            )
         run = replace(there, config=config)
         run._write_about()
         return run
@@ -156,9 +158,7 @@ class RunFolder:
         """Keep an expert that is better than those before."""
         write_tensors(self.path / _BEST, arrays, vars(evaluation))
 
-    def checkpoint(
-        self, arrays: Arrays, about: dict[str, Any], curve: list[Evaluation]
-    ) -> None:
+    def checkpoint(self, arrays: Arrays, about: dict[str, Any], curve: list[Evaluation]) -> None:
         """Keep everything that is needed to go on, and the curve for people to read.
 
         Raises:
@@ -179,6 +179,21 @@ class RunFolder:
         }
         with atomic(self.path / _ABOUT) as temporary:
             temporary.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+
+
+def find_runs(path: Path) -> list[Path]:
+    """The run in a folder, or the runs with an expert in the folders below it, in order.
+
+    Raises:
+        InputError: there are none.
+    """
+    if (path / _ABOUT).exists():
+        return [path]
+    found = sorted(about.parent for about in path.glob(f"*/{_ABOUT}"))
+    found = [folder for folder in found if (folder / _BEST).exists()]
+    if not found:
+        raise InputError(f"{path}: no run, nor a folder of runs with experts")
+    return found
 
 
 def _same_song(one: Demonstration, other: Demonstration) -> bool:

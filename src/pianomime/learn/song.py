@@ -29,10 +29,21 @@ def load_song(name: str | Path, start: float = 0.0, seconds: float = SECONDS) ->
     if Path(name).suffix == ".npz":
         shown = Demonstration.load(name).excerpt(start, seconds)
     else:
-        score = excerpt(Score.from_midi(find_song(str(name))), start, seconds)
+        score = load_score(name, start, seconds)
         shown = Demonstration(score, ZeroShotPlanner().plan(score), source="zero-shot plan")
     check_song(shown, str(name))
     return shown
+
+
+def load_score(name: str | Path, start: float, seconds: float) -> Score:
+    """The score of what `load_song` would load.
+
+    Raises:
+        InputError: there is no such thing.
+    """
+    if Path(name).suffix == ".npz":
+        return Demonstration.load(name).excerpt(start, seconds).score
+    return excerpt(Score.from_midi(find_song(str(name))), start, seconds)
 
 
 def check_song(song: Demonstration, name: str) -> None:
@@ -42,7 +53,9 @@ def check_song(song: Demonstration, name: str) -> None:
         InputError: it is shorter than a second, silent, or no finger plays any of it.
     """
     if len(song.plan) < SHORTEST:
-        raise InputError(f"{name}: lasts {len(song.plan) / 20:.2f} s; a song takes a second at least")
+        raise InputError(
+            f"{name}: lasts {len(song.plan) / 20:.2f} s; a song takes a second at least"
+        )
     if not len(song.score):
         raise InputError(f"{name}: has no notes")
     if not (song.plan.finger_key >= 0).any():

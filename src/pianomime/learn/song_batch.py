@@ -163,9 +163,7 @@ class SongBatch:
         self._f1_sum = state["f1_sum"].copy()
         self._look(self._all)
 
-    def _look(
-        self, which: NDArray[np.int64], tips: NDArray[np.float64] | None = None
-    ) -> None:
+    def _look(self, which: NDArray[np.int64], tips: NDArray[np.float64] | None = None) -> None:
         """Ask the prior, and write observations."""
         frames = self.frames[which]
         last = np.minimum(frames, len(self._plan) - 1)

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from pianomime.learn.config import EnvConfig, preset
+from pianomime.learn.config import EnvConfig, preset_config
 from pianomime.learn.song import load_song
 from pianomime.learn.song_batch import SongBatch
 from pianomime.video.demonstration import Demonstration
@@ -23,9 +23,8 @@ def make_batch(
     threads: int = 0,
 ) -> SongBatch:
     """A batch of what a caller named: a song or its file, a config or the name of a preset."""
-    known = isinstance(demonstration, Demonstration)
-    song = demonstration if known else load_song(demonstration)
-    chosen = preset(config).env if isinstance(config, str) else config
+    song = demonstration if isinstance(demonstration, Demonstration) else load_song(demonstration)
+    chosen = preset_config(config).env if isinstance(config, str) else config
     return SongBatch(song, chosen, envs, threads)
 
 
@@ -39,7 +38,7 @@ def action_space(batch: SongBatch) -> spaces.Box:
     return spaces.Box(-1.0, 1.0, (batch.actions,), np.float32)
 
 
-class SongEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class SongEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     """One song, played by adding residuals to what a tracker proposes.
 
     An episode terminates with the song and is truncated at the longest length of an episode.

@@ -57,7 +57,11 @@ class SongVectorEnv(VectorEnv[_Rows, _Rows, NDArray[Any]]):
     ) -> tuple[_Rows, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
         """Play one frame in every environment."""
         step = self.batch.step(actions)
-        info = {"frame": self.batch.frames.copy(), "f1": step.f1, "blow_ups": step.blow_ups}
+        info: dict[str, Any] = {
+            "frame": self.batch.frames.copy(),
+            "f1": step.f1,
+            "blow_ups": step.blow_ups,
+        }
         ended = step.terminated | step.truncated
         if ended.any():
             info["final_obs"] = np.full(self.num_envs, None, object)
