@@ -32,7 +32,8 @@ def train_expert(
         config: how.
         start: where the excerpt begins [s].
         seconds: its length at most [s].
-        threads: how many worlds step at the same time; 0 for one on each core.
+        threads: of PPO's physics and networks; 0 for one on each core. Curves are the same only
+            with the same number.
         tell: told how far it is.
 
     Returns:

@@ -36,7 +36,7 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
 
     Args:
         run: its folder.
-        threads: how many worlds step at the same time; 0 for one on each core.
+        threads: of the physics and of the networks; 0 for one on each core.
         tell: told how far it is.
 
     Raises:
@@ -53,8 +53,15 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
     state = run.state()
     if state is not None:
         boundary.resume(*state)
-    model.learn(run.config.steps, callback=boundary, reset_num_timesteps=state is None)
-    boundary.between_updates()
+    left = run.config.steps - model.num_timesteps
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads or before)
+    try:
+        # Steps that were taken before are added to those that it is told.
+        model.learn(left, callback=boundary, reset_num_timesteps=state is None)
+        boundary.between_updates()
+    finally:
+        torch.set_num_threads(before)
 
 
 def _check(settings: PpoConfig) -> None:
