@@ -139,7 +139,7 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
     module, config, _ = COMMANDS[name]
     kind = getattr(importlib.import_module(module), config)
     # A command whose defaults depend on its arguments says what they are.
-    default = kind.default(arguments) if hasattr(kind, "default") else tyro.MISSING
+    known = {"default": kind.default(arguments)} if hasattr(kind, "default") else {}
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
@@ -149,7 +149,7 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
                 prog=f"pianomime {name}",
                 description=inspect.cleandoc(kind.__doc__),
                 args=arguments,
-                default=default,
+                **known,
             )
     except SystemExit as stopped:
         if not stopped.code:

@@ -46,7 +46,7 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
     settings = run.config.ppo
     _check(settings)
     env = SongVecEnv(SongBatch(run.song, run.config.env, settings.envs, threads))
-    model = _model(env, settings, run.config.seed)
+    model = make_model(env, settings, run.config.seed)
     model.set_logger(configure(str(run.tensorboard), ["tensorboard"]))
     boundary = _Boundary(run, env, tell)
     boundary.init_callback(model)
@@ -77,7 +77,8 @@ def _check(settings: PpoConfig) -> None:
         )
 
 
-def _model(env: SongVecEnv, settings: PpoConfig, seed: int) -> PPO:
+def make_model(env: SongVecEnv, settings: PpoConfig, seed: int) -> PPO:
+    """Stable-Baselines3's PPO with these settings, untrained."""
     hidden = list(settings.hidden)
 
     def learning_rate(_: float) -> float:
