@@ -157,7 +157,7 @@ class ExpertConfig:
 _PAPER = ExpertConfig()
 """Appendices C and D. Table 6 has 2000 updates of 8192 steps; the default spends fewer."""
 
-_BEST = ExpertConfig(method="search", steps=600_000, env=EnvConfig(prior="dynamic"))
+_BEST = ExpertConfig(method="search", env=EnvConfig(prior="dynamic"))
 """What plays best in a quarter of an hour on two cores."""
 
 PRESETS = {"paper": _PAPER, "best": _BEST}
