@@ -59,6 +59,14 @@ def test_bad_input(tmp_path: Path, small_search: ExpertConfig) -> None:
         train_experts(tmp_path, tmp_path / "out", small_search)
 
 
+def test_a_cluster_that_is_not_there(
+    songs: Path, tmp_path: Path, small_search: ExpertConfig
+) -> None:
+    pytest.importorskip("ray", reason="the extra scale is not installed")
+    with pytest.raises(InputError, match=r"no Ray cluster at '127\.0\.0\.1:1'"):
+        train_experts(songs, tmp_path / "out", small_search, ray="127.0.0.1:1")
+
+
 def test_a_cluster_that_loses_a_node_goes_on(
     songs: Path, tmp_path: Path, small_search: ExpertConfig, monkeypatch: pytest.MonkeyPatch
 ) -> None:

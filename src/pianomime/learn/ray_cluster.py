@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import socket
 from collections.abc import Generator
 from typing import Any
 
@@ -33,8 +34,14 @@ def on_cluster(
     """
     ours = not ray.is_initialized()
     if ours:
+        _reachable(address)
         try:
-            ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
+            ray.init(
+                address=address,
+                log_to_driver=False,
+                logging_level=logging.ERROR,
+                include_dashboard=False if address == "local" else None,
+            )
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise InputError(f"no Ray cluster at {address!r} ({error})") from error
     try:
@@ -54,6 +61,17 @@ def on_cluster(
     finally:
         if ours:
             ray.shutdown()
+
+
+def _reachable(address: str) -> None:
+    """Refuse at once an address where nobody listens; Ray would try for minutes."""
+    host, _, port = address.rpartition(":")
+    if not host or "://" in address or not port.isdigit():
+        return
+    try:
+        socket.create_connection((host, int(port)), timeout=10).close()
+    except (OSError, OverflowError) as error:
+        raise InputError(f"no Ray cluster at {address!r} ({error})") from error
 
 
 def _train(text: str) -> Row:
