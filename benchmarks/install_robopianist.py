@@ -4,7 +4,9 @@ RoboPianist asks for PyAudio and pyfluidsynth, which build on system libraries (
 FluidSynth) and serve only to play sound aloud. Two empty modules of ours stand in for them;
 nothing else of RoboPianist is touched.
 
-    python benchmarks/install_robopianist.py [--environment .cache/robopianist]
+    python benchmarks/install_robopianist.py [--environment .cache/robopianist] [--learning]
+
+With `--learning`, Stable-Baselines3 too, for `speed_learn.py`.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ DEPENDENCIES = (
     "termcolor==3.3.0",
     "tqdm==4.70.1",
 )
+LEARNING = ("gymnasium==1.4.0", "stable-baselines3==2.9.2", "torch==2.13.0")
 # Without its own requirements, because they name the two sound libraries.
 ROBOPIANIST = "robopianist==1.0.10"
 STAND_INS = ("pyaudio", "fluidsynth")
@@ -46,7 +49,9 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     options.add_argument("--environment", type=Path, default=ROOT / ".cache" / "robopianist")
-    folder: Path = options.parse_args().environment
+    options.add_argument("--learning", action="store_true", help="add Stable-Baselines3")
+    arguments = options.parse_args()
+    folder: Path = arguments.environment
     if sys.version_info >= (3, 13):
         # note-seq needs pydub, which imports a module that Python 3.13 has dropped.
         print("RoboPianist needs Python 3.11 or 3.12: run this script with one of them")
@@ -54,7 +59,7 @@ def main() -> int:
     venv.create(folder, with_pip=True)
     python = folder / "bin" / "python"
     pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, *DEPENDENCIES], check=True)
+    subprocess.run([*pip, *DEPENDENCIES, *(LEARNING if arguments.learning else ())], check=True)
     subprocess.run([*pip, "--no-deps", ROBOPIANIST], check=True)
     where = subprocess.run(
         [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],

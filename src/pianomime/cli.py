@@ -51,6 +51,13 @@ COMMANDS = {
     "import-demos": Command(
         "pianomime.commands.import_demos", "ImportDemos", "read the paper's demonstrations"
     ),
+    "train-expert": Command(
+        "pianomime.commands.train_expert", "TrainExpert", "train an expert of one song"
+    ),
+    "train-experts": Command(
+        "pianomime.commands.train_experts", "TrainExperts", "train experts of many songs"
+    ),
+    "collect": Command("pianomime.commands.collect", "Collect", "make a data set of experts"),
     "explain": Command("pianomime.commands.explain", "Explain", "say why notes went wrong"),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }
@@ -131,6 +138,8 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
 
     module, config, _ = COMMANDS[name]
     kind = getattr(importlib.import_module(module), config)
+    # A command whose defaults depend on its arguments says what they are.
+    known = {"default": kind.default(arguments)} if hasattr(kind, "default") else {}
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
@@ -140,6 +149,7 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
                 prog=f"pianomime {name}",
                 description=inspect.cleandoc(kind.__doc__),
                 args=arguments,
+                **known,
             )
     except SystemExit as stopped:
         if not stopped.code:

@@ -29,6 +29,7 @@ class Play:
       pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
       pianomime play DEMO.npz --player demonstration-ik
+      pianomime play SONG.mid --player RUN
     """
 
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
@@ -37,7 +38,8 @@ class Play:
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the report; out/NAME if not given."""
     player: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Name of the player; zero-shot if not given, and for demonstrations, demonstration."""
+    """Name of the player; zero-shot if not given, and for demonstrations, demonstration. Or the
+    folder of an expert (see `pianomime train-expert`), which plays what it was trained on."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
     """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
     On two cores 1 takes about as long as the music or less, 2 and 3 several times longer."""
@@ -78,6 +80,8 @@ class Play:
         from pianomime.play import PLAYERS, Player, excerpt
         from pianomime.song_files import find_song
 
+        if self.player is not None and Path(self.player).is_dir():
+            return self._cast_expert(Path(self.player))
         if Path(self.song).suffix == ".npz":
             from pianomime.video.demonstration import Demonstration
 
@@ -91,6 +95,18 @@ class Play:
         midi = find_song(self.song)
         score = excerpt(Score.from_midi(midi), self.start, self.seconds)
         return player, score, midi.stem
+
+    def _cast_expert(self, folder: Path) -> tuple[Player, Score, str]:
+        """The expert of a run; it plays the excerpt that it was trained on."""
+        from pianomime.commands.extras import extra
+
+        with extra("train"):
+            from pianomime.learn.expert import load_expert
+            from pianomime.learn.song import load_score
+
+            player, run = load_expert(folder)
+            score = load_score(self.song, run.start, run.seconds)
+        return player, score, Path(self.song).stem
 
 
 def _table(row: Row) -> Table:

@@ -49,6 +49,8 @@ class RolloutConfig:
     """of its wrist and forearm;"""
     others: float = 0.1
     """of the hand's other fingers."""
+    seed: int = 0
+    """Of what is drawn."""
 
     @classmethod
     def of_effort(cls, effort: int) -> RolloutConfig:
@@ -65,10 +67,25 @@ class RolloutTracker:
 
     The other tracker is asked for frames ahead of time, more than once, on copies of the world:
     its controls must depend on plan, frame and world alone.
+
+    Attributes:
+        steps: control steps that were simulated to look ahead since the last `begin`.
+
+    Args:
+        tracker: whose controls to improve.
+        config: how hard to try.
+        goal: (T, 88) bool, the keys that should be down; those that the plan presses if None.
     """
 
-    def __init__(self, tracker: Tracker, config: RolloutConfig | None = None) -> None:
+    def __init__(
+        self,
+        tracker: Tracker,
+        config: RolloutConfig | None = None,
+        goal: NDArray[np.bool_] | None = None,
+    ) -> None:
         self.config = config or RolloutConfig()
+        self.steps = 0
+        self._asked = goal
         self._tracker = tracker
         self._hands = [Hand(side) for side in SIDES]
         self._spread = self._spreads()
@@ -77,10 +94,11 @@ class RolloutTracker:
         """Prepare the tracker; draw the same variations for the same plan."""
         self._tracker.begin(plan)
         self._batch = WorldBatch(self.config.variations, quiet=True)
-        self._goal = plan.keys()
+        self._goal = plan.keys() if self._asked is None else self._asked
         self._finger_key = plan.finger_key
         self._along = plan.fingertips[:, :, 1:, 1]
-        self._rng = np.random.default_rng(0)
+        self._rng = np.random.default_rng(self.config.seed)
+        self.steps = 0
         self._ctrl: list[NDArray[np.float64]] = []
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
@@ -99,6 +117,7 @@ class RolloutTracker:
             ctrl[step] = self._tracker.control(frame + step, ahead)
             ahead.step(ctrl[step])
             pressed[step] = ahead.pressed
+        self.steps += len(goal)
         wrong = pressed != goal
         if not wrong[: self.config.commit + 2].any():
             return ctrl
@@ -119,6 +138,7 @@ class RolloutTracker:
     ) -> NDArray[np.float64]:
         """(B,) what each of the controls (B, H, 46) does wrong from a moment on."""
         self._batch.set_state(moment)
+        self.steps += len(ctrl) * len(goal)
         cost = np.zeros(len(ctrl))
         for step in range(len(goal)):
             self._batch.step(ctrl[:, step])

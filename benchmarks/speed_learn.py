@@ -1,0 +1,160 @@
+"""Steps a second of learning: the vector environment alone, and PPO end to end, beside a peer.
+
+The peer is RoboPianist in Stable-Baselines3's SubprocVecEnv, in a Python of its own that
+`benchmarks/install_robopianist.py --learning` makes; without it, only ours are timed. Both are run
+in turns, several rounds, so that whatever else the machine does hits them alike; medians count.
+PPO has the network and the batch of the paper (tables 6 and 7); a step is 0.05 s of playing in one
+environment. Ours is the `paper` preset with its inverse kinematics, which the peer has none of.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import common
+from pianomime.learn.config import PpoConfig, preset_config
+from pianomime.learn.ppo import make_model
+from pianomime.learn.song import load_song
+from pianomime.learn.song_batch import SongBatch
+from pianomime.learn.song_vec_env import SongVecEnv
+
+
+class Peer:
+    """RoboPianist and Stable-Baselines3 in a process of their own, idle unless asked."""
+
+    def __init__(self, python: Path, *arguments: int) -> None:
+        self._process = subprocess.Popen(
+            [
+                str(python),
+                str(Path(__file__).with_name("robopianist_sb3.py")),
+                *map(str, arguments),
+            ],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "MUJOCO_GL": "disable", "PYTHONWARNINGS": "ignore"},
+        )
+        self.facts = self._answer()
+
+    def rate(self, mode: str) -> float:
+        """Steps a second in a mode."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps({"mode": mode}) + "\n")
+        self._process.stdin.flush()
+        answer = self._answer()
+        return float(answer["steps"] / answer["seconds"])
+
+    def close(self) -> None:
+        """End the process."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait()
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            raise SystemExit("RoboPianist's process ended; its error is above")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+
+class Ours:
+    """The `paper` preset on a bundled song."""
+
+    def __init__(self, song: str, envs: int, steps: int, ppo: PpoConfig) -> None:
+        import torch
+
+        torch.set_num_threads(len(common.cores()))
+        config = replace(preset_config("paper"), ppo=ppo)
+        self._vec = SongVecEnv(SongBatch(load_song(song), config.env, envs))
+        self._vec.reset()
+        draw = np.random.default_rng(0)
+        self._actions = draw.uniform(-1, 1, (steps, envs, 46)).astype(np.float32) * 0.1
+        self._model = make_model(self._vec, ppo, 0)
+        self._update = ppo.steps_per_update
+        self.facts = {"observations": self._vec.batch.observer.size, "actions": 46}
+
+    def rate(self, mode: str) -> float:
+        """Steps a second in a mode."""
+        start = time.perf_counter()
+        if mode == "environment":
+            for action in self._actions:
+                self._vec.step(action)
+            return float(self._actions[..., 0].size / (time.perf_counter() - start))
+        self._model.learn(self._update)
+        return self._update / (time.perf_counter() - start)
+
+    def close(self) -> None:
+        """Nothing is left open."""
+        self._vec.close()
+
+
+def main() -> None:
+    options = common.parser("speed_learn", __doc__)
+    options.add_argument("--rounds", type=int, default=5)
+    options.add_argument("--envs", type=int, default=32)
+    options.add_argument("--steps", type=int, default=60, help="of each environment, a round")
+    options.add_argument("--update", type=int, default=8192, help="steps between PPO's updates")
+    options.add_argument("--song", default="beethoven-fur-elise", help="bundled song or file")
+    options.add_argument(
+        "--peer-python",
+        type=Path,
+        default=common.ROOT / ".cache" / "robopianist" / "bin" / "python",
+        help="RoboPianist's Python (%(default)s)",
+    )
+    arguments = options.parse_args()
+    facts = common.machine()
+    common.show_machine(facts)
+    ppo = PpoConfig(envs=arguments.envs, steps_per_update=arguments.update)
+    sides: dict[str, Ours | Peer] = {
+        "ours": Ours(arguments.song, arguments.envs, arguments.steps, ppo)
+    }
+    if arguments.peer_python.exists():
+        sides["RoboPianist"] = Peer(
+            arguments.peer_python,
+            arguments.envs,
+            arguments.steps,
+            ppo.steps_per_update,
+            ppo.batch,
+            len(common.cores()),
+        )
+    else:
+        print(f"RoboPianist is left out: no {arguments.peer_python}\n")
+    rates: dict[str, dict[str, list[float]]] = {
+        mode: {who: [] for who in sides} for mode in ("environment", "ppo")
+    }
+    for _ in range(arguments.rounds):
+        for mode, found in rates.items():
+            for who, side in sides.items():
+                found[who].append(side.rate(mode))
+    for side in sides.values():
+        side.close()
+    rows = []
+    for mode, found in rates.items():
+        for who, values in found.items():
+            rows.append((mode, who, statistics.median(values), min(values), max(values)))
+    common.table(("what", "who", "steps/s (median)", "slowest round", "fastest round"), rows)
+    ratios = {
+        mode: statistics.median(found["ours"]) / statistics.median(found["RoboPianist"])
+        for mode, found in rates.items()
+        if "RoboPianist" in found
+    }
+    if ratios:
+        print()
+        common.table(("ours / RoboPianist", ""), list(ratios.items()))
+    sizes = {who: side.facts for who, side in sides.items()}
+    common.report(arguments.output, facts, {"rates": rates, "ratios": ratios, "sizes": sizes})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,72 @@
+"""`pianomime collect`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+if TYPE_CHECKING:
+    from pianomime.commands.progress import Tell
+    from pianomime.learn.episode import Episode
+
+
+@dataclass(frozen=True)
+class Collect:
+    """Make a data set for imitation of what experts play.
+
+    OUT is a zarr 3 group of documented arrays: state, goal, fingertips, prior, residual and action
+    of every frame, one episode after the other.
+
+    Examples:
+      pianomime collect out/experts-FOLDER-best -o experts.zarr
+      pianomime collect RUN RUN -o experts.zarr
+      pianomime collect experts.npz --demonstrations demonstrations.npz -o experts.zarr
+    """
+
+    runs: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="RUN...")]
+    """Folders of runs, folders of such folders, or .npz files of PianoMime's published experts."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/experts.zarr")
+    """The data set; one that is there is replaced."""
+    demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """The demonstrations that published experts were trained on, an .npz file."""
+
+    def run(self) -> None:
+        """Collect.
+
+        Raises:
+            InputError: a run or a file cannot be used.
+            OSError: a file cannot be read or written.
+        """
+        from pianomime.commands.extras import extra
+        from pianomime.commands.progress import bars
+
+        with extra("train"), bars() as tell:
+            from pianomime.learn.expert_data import write_expert_data
+
+            number = write_expert_data(self.out, self._episodes(tell))
+        print(f"saved {number} episodes: {self.out}")
+
+    def _episodes(self, tell: Tell) -> Iterator[Episode]:
+        from pianomime.errors import InputError
+        from pianomime.learn.episode import play_episode, published_episodes
+        from pianomime.learn.run_folder import RunFolder, find_runs
+
+        if not self.runs:
+            raise InputError("no runs to collect")
+        for path in self.runs:
+            if path.suffix == ".npz":
+                if self.demonstrations is None:
+                    raise InputError(f"{path}: needs --demonstrations, what it was trained on")
+                published = published_episodes(path, self.demonstrations)
+                for done, (episode, total) in enumerate(published, 1):
+                    yield episode
+                    tell(path.name, done, total)
+                continue
+            found = find_runs(path)
+            for done, folder in enumerate(found, 1):
+                yield play_episode(RunFolder.load(folder))
+                tell("playing", done, len(found))

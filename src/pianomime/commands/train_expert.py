@@ -1,0 +1,89 @@
+"""`pianomime train-expert`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from pianomime.commands.extras import extra
+from pianomime.learn.config import ExpertConfig, preset_config
+
+PresetName = Literal["paper", "best"]
+
+
+@dataclass(frozen=True)
+class TrainExpert:
+    """Train an expert of one song, on a human's demonstration or on the zero-shot plan.
+
+    RUN then holds the expert, its learning curve (curve.json, tensorboard/) and all that is needed
+    to go on: a run that was interrupted goes on where it was when it is started again with the same
+    RUN, and one that is finished goes on with more --steps.
+
+    Examples:
+      pianomime train-expert DEMO.npz
+      pianomime train-expert SONG.mid --preset best -o runs/song
+      pianomime train-expert DEMO.npz --steps 5000000 --ppo.learning-rate 1e-4
+      pianomime play SONG.mid --player runs/song
+    """
+
+    song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
+    """A demonstration (see `pianomime retarget`), a MIDI file, or the name of a bundled song."""
+    preset: PresetName = "paper"
+    """The paper's residual policy, or what plays best; settings below change it."""
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="RUN")] = None
+    """Folder of the run; out/expert-SONG-PRESET if not given."""
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
+    """How much to play at most, from what sounds at START or first after it [s]."""
+    start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
+    """Where in the song to begin [s]."""
+    config: Annotated[ExpertConfig, tyro.conf.arg(name="")] = field(default_factory=ExpertConfig)
+    """Everything else."""
+
+    @classmethod
+    def default(cls, arguments: list[str]) -> TrainExpert:
+        """What holds for arguments that are not given: that is for the preset to say."""
+        return cls(song=tyro.MISSING, config=preset_config(named_preset(arguments)))
+
+    def run(self) -> None:
+        """Train.
+
+        Raises:
+            InputError: the song or the folder cannot be used.
+            OSError: a file cannot be read or written.
+        """
+        from pianomime.commands.progress import bars
+
+        with extra("train"):
+            from pianomime.learn.expert import train_expert
+        out = self.out or Path("out", f"expert-{Path(self.song).stem}-{self.preset}")
+        with bars() as tell, extra("train"):
+            run = train_expert(
+                self.song,
+                out,
+                self.config,
+                self.start,
+                self.seconds,
+                tell=lambda done, total, remark: tell("training", done, total, remark),
+            )
+        best = run.best()[1]
+        print(f"F1 {best['f1']:.3f} after {best['steps']} steps")
+        print(f"saved: {out}")
+        print(f"play it: pianomime play {self.song} --player {out}")
+
+
+def named_preset(arguments: list[str]) -> str:
+    """The preset that a command line names."""
+    for place, argument in enumerate(arguments):
+        if argument.startswith("--preset="):
+            return _known(argument.partition("=")[2])
+        if argument == "--preset" and place + 1 < len(arguments):
+            return _known(arguments[place + 1])
+    return "paper"
+
+
+def _known(name: str) -> str:
+    preset_config(name)
+    return name

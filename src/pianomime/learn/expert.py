@@ -1,0 +1,86 @@
+"""Experts: train one on a song, and play with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pianomime.errors import InputError
+from pianomime.learn.config import ExpertConfig
+from pianomime.learn.run_folder import RunFolder
+from pianomime.learn.song import load_song
+from pianomime.learn.stored_tracker import StoredTracker
+from pianomime.learn.tell import Tell
+from pianomime.play import SECONDS, Player
+from pianomime.track import Tracker
+from pianomime.video.demonstration import DemonstrationPlanner
+
+
+def train_expert(
+    song: str | Path,
+    out: Path,
+    config: ExpertConfig,
+    start: float = 0.0,
+    seconds: float = SECONDS,
+    threads: int = 0,
+    tell: Tell | None = None,
+) -> RunFolder:
+    """Train an expert of one song, or go on where a run of the same was.
+
+    Args:
+        song: a demonstration (.npz), a MIDI file or the name of a bundled song.
+        out: folder of the run.
+        config: how.
+        start: where the excerpt begins [s].
+        seconds: its length at most [s].
+        threads: of PPO's physics and networks; 0 for one on each core. Curves are the same only
+            with the same number.
+        tell: told how far it is.
+
+    Returns:
+        The run, with its best expert.
+
+    Raises:
+        InputError: the song, the config or what is in the folder cannot be used.
+        OSError: the folder cannot be written; what was there before stays.
+    """
+    if config.steps < 1:
+        raise InputError(f"steps must be 1 or more, not {config.steps}")
+    run = RunFolder.open(out, load_song(song, start, seconds), config, start, seconds)
+    if run.finished:
+        return run
+    told = tell or (lambda done, total, remark: None)
+    if config.method == "ppo":
+        from pianomime.learn.ppo import train_ppo
+
+        train_ppo(run, threads, told)
+    else:
+        from pianomime.learn.search import search
+
+        search(run, told)
+    return run
+
+
+def load_expert(path: Path) -> tuple[Player, RunFolder]:
+    """The best expert of a run, as a player, and the run.
+
+    Raises:
+        InputError: there is no run, nothing was trained in it, or it is damaged.
+    """
+    run = RunFolder.load(path)
+    return Player("expert", DemonstrationPlanner(run.song), expert_tracker(run)), run
+
+
+def expert_tracker(run: RunFolder) -> Tracker:
+    """The tracker of the best expert of a run.
+
+    Raises:
+        InputError: nothing was trained yet, or the weights are damaged.
+    """
+    arrays, _ = run.best()
+    if run.config.method == "ppo":
+        from pianomime.learn.policy import PolicyTracker
+
+        return PolicyTracker.from_arrays(run.song, run.config, arrays)
+    if "ctrl" not in arrays or arrays["ctrl"].shape != (len(run.song.plan), 46):
+        raise InputError(f"{run.path}: the expert's controls do not fit its song")
+    return StoredTracker(arrays["ctrl"])

@@ -1,0 +1,142 @@
+"""The expert data set: episodes one after the other, in zarr 3.
+
+Read it with no more than zarr:
+
+    import zarr
+
+    data = zarr.open_group("experts.zarr", mode="r")
+    ends = data["episode_end"][:]
+    for first, end in zip([0, *ends], ends):
+        joints, action = data["joints"][first:end], data["action"][first:end]
+
+Every array's attribute `about` says what it holds; the group's attribute `episodes` has the name,
+the F1 and the prior of each episode.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.learn.episode import COLUMNS, Episode
+
+FORMAT = "pianomime experts"
+VERSION = 1
+_CHUNK = 4096
+
+
+def write_expert_data(path: Path, episodes: Iterator[Episode]) -> int:
+    """Write episodes, all or nothing; an older data set at the same place is replaced.
+
+    Args:
+        path: where to, a folder that is not there yet or a data set.
+        episodes: what to.
+
+    Returns:
+        How many.
+
+    Raises:
+        InputError: there is something else at the place, or there are no episodes.
+        OSError: it cannot be written.
+    """
+    if path.exists():
+        ExpertData.open(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:
+        fresh = Path(folder, path.name)
+        group = zarr.open_group(str(fresh), mode="w", zarr_format=3)
+        for name, column in COLUMNS.items():
+            array = group.create_array(
+                name,
+                shape=(0, *column.shape),
+                dtype=column.dtype,
+                chunks=(_CHUNK, *column.shape),
+            )
+            array.attrs["about"] = column.about
+        ends = [0]
+        about: list[Any] = []
+        for episode in episodes:
+            for name in COLUMNS:
+                _array(group, name).append(episode.columns[name])
+            ends.append(ends[-1] + len(episode.columns["goal"]))
+            about.append({"name": episode.name, "f1": episode.f1, "prior": episode.prior_name})
+        if not about:
+            raise InputError("there are no episodes to collect")
+        marks = group.create_array("episode_end", data=np.array(ends[1:], np.int64))
+        marks.attrs["about"] = "one past the last row of each episode"
+        group.attrs.update({"format": FORMAT, "version": VERSION, "episodes": about})
+        if path.exists():
+            os.replace(path, Path(folder, "older"))
+        os.replace(fresh, path)
+        shutil.rmtree(Path(folder, "older"), ignore_errors=True)
+    return len(about)
+
+
+@dataclass(frozen=True, eq=False)
+class ExpertData:
+    """A data set, read where it lies.
+
+    Attributes:
+        group: the zarr group.
+        ends: (E,) one past the last row of each episode.
+        episodes: name, f1 and prior of each.
+    """
+
+    group: zarr.Group
+    ends: NDArray[np.int64]
+    episodes: list[dict[str, Any]]
+
+    @classmethod
+    def open(cls, path: Path) -> ExpertData:
+        """A data set that is there.
+
+        Raises:
+            InputError: there is none, or one of another version or shape.
+        """
+        try:
+            group = zarr.open_group(str(path), mode="r")
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{path}: not an expert data set") from error
+        if group.attrs.get("format") != FORMAT:
+            raise InputError(f"{path}: not an expert data set")
+        if group.attrs.get("version") != VERSION:
+            raise InputError(
+                f"{path}: an expert data set of version {group.attrs.get('version')}; "
+                f"this program reads {VERSION}"
+            )
+        if "episode_end" not in group:
+            raise InputError(f"{path}: has no episode_end")
+        ends = np.asarray(_array(group, "episode_end")[:])
+        for name, column in COLUMNS.items():
+            if name not in group or _array(group, name).shape != (int(ends[-1]), *column.shape):
+                raise InputError(f"{path}: {name} is missing or has another shape")
+        episodes: Any = group.attrs["episodes"]
+        return cls(group, ends, list(episodes))
+
+    def __len__(self) -> int:
+        """Number of episodes."""
+        return len(self.ends)
+
+    def episode(self, number: int) -> Episode:
+        """One episode, in memory."""
+        first = int(self.ends[number - 1]) if number else 0
+        rows = slice(first, int(self.ends[number]))
+        about = self.episodes[number]
+        columns = {name: np.asarray(_array(self.group, name)[rows]) for name in COLUMNS}
+        return Episode(about["name"], about["f1"], about["prior"], columns)
+
+
+def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
+    array = group[name]
+    assert isinstance(array, zarr.Array)
+    return array

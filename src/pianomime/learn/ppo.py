@@ -1,0 +1,210 @@
+"""Residual reinforcement learning of one song (paper, algorithm 1), with Stable-Baselines3's PPO.
+
+A run can be stopped at any instant and goes on to the same curve. That takes two things. All that
+is drawn during an update is drawn from generators seeded by the run's seed and the number of the
+update. And between updates the worlds are put where a checkpoint of them would put them, whether or
+not one is ever read: MuJoCo does not tell which keys sleep, so a world that was read from a
+checkpoint would otherwise differ in the last digits from one that went on.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+
+from pianomime.errors import InputError
+from pianomime.learn.config import PpoConfig
+from pianomime.learn.policy import ACTIVATIONS, PolicyTracker
+from pianomime.learn.run_folder import Evaluation, RunFolder
+from pianomime.learn.song_batch import SongBatch
+from pianomime.learn.song_vec_env import SongVecEnv
+from pianomime.learn.tell import Tell
+from pianomime.learn.tensors import Arrays
+from pianomime.play import Player
+from pianomime.video.demonstration import DemonstrationPlanner
+
+
+def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
+    """Train until the run's steps are spent; go on where it was.
+
+    Args:
+        run: its folder.
+        threads: of the physics and of the networks; 0 for one on each core.
+        tell: told how far it is.
+
+    Raises:
+        InputError: settings do not fit together, or the checkpoint is damaged.
+        OSError: a checkpoint cannot be written; the one before stays.
+    """
+    settings = run.config.ppo
+    _check(settings)
+    env = SongVecEnv(SongBatch(run.song, run.config.env, settings.envs, threads))
+    model = make_model(env, settings, run.config.seed)
+    model.set_logger(configure(str(run.tensorboard), ["tensorboard"]))
+    boundary = _Boundary(run, env, tell)
+    boundary.init_callback(model)
+    state = run.state()
+    if state is not None:
+        boundary.resume(*state)
+    left = run.config.steps - model.num_timesteps
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads or before)
+    try:
+        # Steps that were taken before are added to those that it is told.
+        model.learn(left, callback=boundary, reset_num_timesteps=state is None)
+        boundary.between_updates()
+    finally:
+        torch.set_num_threads(before)
+
+
+def _check(settings: PpoConfig) -> None:
+    if settings.envs < 1 or settings.steps_per_update % settings.envs:
+        raise InputError(
+            f"steps per update ({settings.steps_per_update}) must be a multiple of "
+            f"envs ({settings.envs})"
+        )
+    if not 1 < settings.batch <= settings.steps_per_update:
+        raise InputError(
+            f"batch ({settings.batch}) must be from 2 to steps per update "
+            f"({settings.steps_per_update})"
+        )
+
+
+def make_model(env: SongVecEnv, settings: PpoConfig, seed: int) -> PPO:
+    """Stable-Baselines3's PPO with these settings, untrained."""
+    hidden = list(settings.hidden)
+
+    def learning_rate(_: float) -> float:
+        update = max(model.num_timesteps // settings.steps_per_update - 1, 0)
+        return settings.learning_rate * settings.decay**update
+
+    model: PPO
+    model = PPO(
+        "MlpPolicy",
+        env,
+        learning_rate=settings.learning_rate,
+        n_steps=settings.steps_per_update // settings.envs,
+        batch_size=settings.batch,
+        n_epochs=settings.epochs,
+        gamma=settings.discount,
+        gae_lambda=settings.gae,
+        clip_range=settings.clip,
+        ent_coef=settings.entropy,
+        vf_coef=settings.value,
+        max_grad_norm=settings.gradient_norm,
+        target_kl=settings.target_kl or None,
+        policy_kwargs={
+            "net_arch": {"pi": hidden, "vf": hidden},
+            "activation_fn": ACTIVATIONS[settings.activation],
+            "log_std_init": math.log(settings.noise),
+        },
+        seed=seed,
+        device="cpu",
+    )
+    model.lr_schedule = learning_rate
+    return model
+
+
+class _Boundary(BaseCallback):
+    """What happens between updates: evaluate, keep the best, write a checkpoint, seed anew."""
+
+    def __init__(self, run: RunFolder, env: SongVecEnv, tell: Tell) -> None:
+        super().__init__()
+        self._run, self._env, self._tell = run, env, tell
+        self._curve: list[Evaluation] = []
+        self._fresh = True
+
+    def resume(self, arrays: Arrays, about: dict[str, Any]) -> None:
+        """Put model and environments where a checkpoint has them."""
+        self._curve = [Evaluation(**row) for row in about["curve"]]
+        self.model.num_timesteps = int(about["steps"])
+        parts: dict[str, Arrays] = {"policy": {}, "adam": {}, "env": {}}
+        for name, array in arrays.items():
+            part, _, rest = name.partition("/")
+            parts[part][rest] = array
+        try:
+            self.model.policy.load_state_dict(_tensors(parts["policy"]))
+        except RuntimeError as error:
+            raise InputError(f"{self._run.path}: the checkpoint does not fit the config") from error
+        optimizer = self.model.policy.optimizer
+        known = optimizer.state_dict()
+        known["state"] = {}
+        for name, tensor in _tensors(parts["adam"]).items():
+            index, _, field = name.partition("/")
+            known["state"].setdefault(int(index), {})[field] = tensor
+        optimizer.load_state_dict(known)
+        self._env.resume(parts["env"])
+        self._fresh = False
+
+    def between_updates(self) -> None:
+        """Evaluate and write what has been learned; begin the next update the same each time."""
+        steps = self.model.num_timesteps
+        update = steps // self._run.config.ppo.steps_per_update
+        # A checkpoint that was just read needs not be written again.
+        if self._fresh:
+            self._env.batch.set_state(self._env.batch.state())
+            due = update % self._run.config.ppo.evaluate_every == 0
+            if due or steps >= self._run.config.steps:
+                self._evaluate(steps)
+            self._run.checkpoint(self._arrays(), {"steps": steps}, self._curve)
+        self._fresh = True
+        draws = np.random.SeedSequence([self._run.config.seed, update]).generate_state(3)
+        torch.manual_seed(int(draws[0]))
+        np.random.seed(int(draws[1]))  # noqa: NPY002 - Stable-Baselines3 draws from it
+        random.seed(int(draws[2]))
+        self._env.reseed(self._run.config.seed, update)
+
+    def _on_rollout_start(self) -> None:
+        self.between_updates()
+
+    def _on_step(self) -> bool:
+        best = max((one.f1 for one in self._curve), default=0.0)
+        now = self._curve[-1].f1 if self._curve else 0.0
+        remark = f"F1 {now:.3f}, best {best:.3f}"
+        self._tell(self.model.num_timesteps, self._run.config.steps, remark)
+        return True
+
+    def _evaluate(self, steps: int) -> None:
+        weights = _actor_arrays(self.model)
+        tracker = PolicyTracker.from_arrays(self._run.song, self._run.config, weights)
+        player = Player("expert", DemonstrationPlanner(self._run.song), tracker)
+        metrics = player.play(self._run.song.score).metrics()
+        made = Evaluation(steps, metrics["precision"], metrics["recall"], metrics["f1"])
+        if made.f1 > max((one.f1 for one in self._curve), default=-1.0):
+            self._run.keep_best(weights, made)
+        self._curve.append(made)
+        for name in ("precision", "recall", "f1"):
+            self.logger.record(f"song/{name}", metrics[name])
+        if steps:
+            buffer = self.model.rollout_buffer  # type: ignore[attr-defined]
+            self.logger.record("song/reward", float(buffer.rewards.mean()))
+        self.logger.dump(steps)
+
+    def _arrays(self) -> Arrays:
+        arrays: Arrays = {}
+        for name, tensor in self.model.policy.state_dict().items():
+            arrays[f"policy/{name}"] = tensor.numpy()
+        for index, fields in self.model.policy.optimizer.state_dict()["state"].items():
+            for field, tensor in fields.items():
+                arrays[f"adam/{index}/{field}"] = tensor.numpy()
+        for name, array in self._env.batch.state().items():
+            arrays[f"env/{name}"] = array
+        return arrays
+
+
+def _tensors(arrays: Arrays) -> dict[str, torch.Tensor]:
+    return {name: torch.from_numpy(array.copy()) for name, array in arrays.items()}
+
+
+def _actor_arrays(model: Any) -> Arrays:
+    """The weights of the actor alone, named as `pianomime.learn.policy.actor` names them."""
+    layers = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
+    network = torch.nn.Sequential(*layers)
+    return {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}

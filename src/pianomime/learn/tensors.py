@@ -1,0 +1,50 @@
+"""Named arrays and a little text in one safetensors file; nothing in it is ever executed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import safetensors
+from numpy.typing import NDArray
+from safetensors.numpy import save
+
+from pianomime.errors import InputError
+from pianomime.files import atomic
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def write_tensors(path: Path, arrays: Arrays, about: dict[str, Any]) -> None:
+    """Write a file, whole or not at all.
+
+    Args:
+        path: where to.
+        arrays: what to.
+        about: anything that JSON can hold.
+
+    Raises:
+        OSError: the disk is full, or the folder cannot be written; what was there stays.
+    """
+    plain = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    content = save(plain, {"about": json.dumps(about)})
+    with atomic(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def read_tensors(path: Path) -> tuple[Arrays, dict[str, Any]]:
+    """What `write_tensors` wrote.
+
+    Raises:
+        InputError: there is no such file, or it is another or a damaged one.
+    """
+    try:
+        with safetensors.safe_open(path, framework="numpy") as file:
+            about = json.loads(file.metadata()["about"])
+            return {name: file.get_tensor(name) for name in file.keys()}, about  # noqa: SIM118
+    except FileNotFoundError:
+        raise InputError(f"{path}: does not exist") from None
+    except (safetensors.SafetensorError, KeyError, TypeError, ValueError, OSError) as error:
+        raise InputError(f"{path}: damaged, or not a file of this program ({error})") from error

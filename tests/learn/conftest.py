@@ -1,0 +1,72 @@
+"""What the tests of learning share: a song of two notes, and settings that take a second."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pianomime.learn.config import (
+    EnvConfig,
+    EpisodeConfig,
+    ExpertConfig,
+    ObservationConfig,
+    PpoConfig,
+    SearchConfig,
+)
+from pianomime.music import Score
+from pianomime.plan import FingertipPlan, ZeroShotPlanner
+from pianomime.video.demonstration import Demonstration
+
+SMALL = PpoConfig(
+    envs=4, steps_per_update=128, batch=64, epochs=2, hidden=(32, 16), learning_rate=1e-3
+)
+
+
+@pytest.fixture(scope="session")
+def two_notes() -> Demonstration:
+    """One note for each hand, 1.5 s in all."""
+    score = Score(
+        key=np.array([30, 50]),
+        onset=np.array([0.3, 0.8]),
+        offset=np.array([0.7, 1.4]),
+        velocity=np.array([80, 80]),
+        pedal=np.array([[0.5, 1.0]]),
+        title="two notes",
+    )
+    return Demonstration(score, ZeroShotPlanner().plan(score), source="made up")
+
+
+@pytest.fixture(scope="session")
+def shallow(two_notes: Demonstration) -> Demonstration:
+    """The same, but for a plan whose fingers stop short: the prior alone presses nothing."""
+    fingertips = two_notes.plan.fingertips.copy()
+    fingertips[:, :, 1:, 2][two_notes.plan.finger_key >= 0] = 0.03
+    plan = FingertipPlan(
+        fingertips,
+        two_notes.plan.finger_key,
+        two_notes.plan.note_hand,
+        two_notes.plan.note_finger,
+    )
+    return dataclasses.replace(two_notes, plan=plan)
+
+
+@pytest.fixture
+def small_ppo() -> ExpertConfig:
+    """Three updates of a small network."""
+    return ExpertConfig(method="ppo", steps=384, ppo=SMALL)
+
+
+@pytest.fixture
+def small_search() -> ExpertConfig:
+    """A few passes that try little."""
+    search = SearchConfig(variations=4, rounds=1, ahead=6)
+    return ExpertConfig(method="search", steps=600, env=EnvConfig(prior="ik"), search=search)
+
+
+@pytest.fixture
+def every_part() -> EnvConfig:
+    """All parts of an observation, episodes that begin anywhere and are cut short."""
+    seen = ObservationConfig(goal=3, fingertips=2, errors=True, time=True)
+    return EnvConfig(observation=seen, episode=EpisodeConfig(start="anywhere", frames=7))

@@ -1,0 +1,112 @@
+"""The command line of learning."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pianomime.cli import main
+from pianomime.learn.run_folder import RunFolder
+from pianomime.video.demonstration import Demonstration
+
+QUICK = ["--steps", "200", "--search.variations", "4", "--search.rounds", "1"]
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path: Path, two_notes: Demonstration, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    two_notes.save("demo.npz")
+
+
+def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+def test_an_expert_is_trained_and_plays(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["train-expert", "demo.npz", "--preset", "best", "-o", "run", *QUICK])
+    config = RunFolder.load(Path("run")).config
+    # What was asked for, and for the rest the preset.
+    assert (config.method, config.env.prior) == ("search", "dynamic")
+    assert (config.steps, config.search.variations) == (200, 4)
+    told = capsys.readouterr().out
+    assert "pianomime play demo.npz --player run" in told
+    main(["play", "demo.npz", "--player", "run", "--no-video", "-o", "report"])
+    row = json.loads(Path("report/report.json").read_text())
+    assert f"F1 {row['f1']:.3f}" in told
+    assert row["player"] == "expert"
+    Path("songs").mkdir()
+    Path("demo.npz").rename("songs/demo.npz")
+    main(["train-experts", "songs", "--preset=best", "-o", "all", "--jobs", "1", *QUICK])
+    assert "| demo |" in capsys.readouterr().out
+    main(["collect", "all", "-o", "experts.zarr"])
+    assert "saved 1 episodes" in capsys.readouterr().out
+
+
+def test_a_bundled_song_needs_no_demonstration() -> None:
+    quick = [*QUICK, "--method", "search", "--seconds", "2"]
+    main(["train-expert", "ode-to-joy", *quick])
+    run = RunFolder.load(Path("out/expert-ode-to-joy-paper"))
+    assert run.song.source == "zero-shot plan"
+    main(["play", "ode-to-joy", "--player", str(run.path), "--no-video", "-o", "report"])
+
+
+def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "paper, best" in fails(["train-expert", "demo.npz", "--preset", "worst"], capsys)
+    assert "steps" in fails(["train-expert", "demo.npz", "--steps", "0"], capsys)
+    assert "no such file" in fails(["train-expert", "nothing.mid"], capsys)
+    assert "does not exist" in fails(["train-expert", "nothing.npz"], capsys)
+    assert "a second" in fails(["train-expert", "demo.npz", "--seconds", "0.2"], capsys)
+    Path("other").mkdir()
+    assert "not the folder of a run" in fails(["play", "demo.npz", "--player", "other"], capsys)
+    main(["train-expert", "demo.npz", "--method", "search", "-o", "run", *QUICK])
+    capsys.readouterr()
+    assert "not the score" in fails(["play", "ode-to-joy", "--player", "run", "--no-video"], capsys)
+    assert "no runs" in fails(["collect"], capsys)
+    assert "no demonstrations" in fails(["train-experts", "other"], capsys)
+
+
+def test_without_the_extra_it_says_what_to_install() -> None:
+    script = (
+        "import sys\n"
+        "class Without:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name in ('gymnasium', 'torch', 'stable_baselines3', 'safetensors', 'zarr'):\n"
+        "            raise ModuleNotFoundError(f'No module named {name!r}', name=name)\n"
+        "sys.meta_path.insert(0, Without())\n"
+        "from pianomime.cli import main\n"
+        "main(sys.argv[1:])\n"
+    )
+    for arguments in (["train-expert", "demo.npz"], ["collect", "run"]):
+        done = subprocess.run(
+            [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert "pip install 'pianomime[train]'" in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+    helped = subprocess.run(
+        [sys.executable, "-c", script, "train-expert", "--help"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "Examples:" in helped.stdout
+
+
+def test_torch_is_imported_only_to_learn() -> None:
+    script = (
+        "import sys, pianomime.learn.expert, pianomime.learn.song_env, pianomime.learn.search\n"
+        "print([name for name in ('torch', 'stable_baselines3', 'zarr') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
