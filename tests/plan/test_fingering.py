@@ -102,6 +102,36 @@ def test_every_polyphony(notes: int) -> None:
     assert dropped < notes
 
 
+@pytest.mark.parametrize("notes", [7, 8, 9, 10])
+def test_of_chords_wider_than_two_hands_some_is_played(notes: int) -> None:
+    fingering = find_fingering(chord(list(range(0, 9 * notes, 9))))
+    assert (fingering.hand >= 0).sum() >= 2
+
+
+@settings(max_examples=40, deadline=None)
+@given(score=scores(most_notes=40))
+def test_a_hand_that_comes_late_strikes_nothing_before(score: Score) -> None:
+    fingering = find_fingering(score)
+    first, end = score.note_frames().T
+    for hand in (LEFT, RIGHT):
+        mine = np.flatnonzero((fingering.hand == hand) & (first < end))
+        order = mine[np.argsort(first[mine], kind="stable")]
+        # A later note starts later than any before it that is still held then.
+        for place, note in enumerate(order):
+            earlier = order[:place][first[order[:place]] < first[note]]
+            held = earlier[fingering.stop[earlier] > fingering.start[note]]
+            assert (fingering.start[held] <= fingering.start[note]).all()
+
+
+def test_a_hand_does_not_play_on_its_way_to_a_late_note() -> None:
+    bass = [(5, 0, 60), (12, 0, 60)]
+    leap = [(50, 10, 20), (53, 10, 20), (82, 20, 40), (85, 21, 40), (86, 22, 40)]
+    score = score_of(*bass, *leap)
+    fingering = find_fingering(score)
+    right = np.flatnonzero((fingering.hand == RIGHT) & (score.key > 80))
+    assert (np.diff(fingering.start[right]) >= 0).all()
+
+
 def test_all_keys_at_once() -> None:
     fingering = find_fingering(chord(list(range(88))))
     assert 0 < (fingering.hand >= 0).sum() <= 10
@@ -203,6 +233,7 @@ def test_mirrored_music_swaps_the_hands(score: Score) -> None:
     order = np.lexsort((-mirrored_score.key, mirrored_score.onset))
     swapped = np.where(fingering.hand >= 0, 1 - fingering.hand, -1)
     np.testing.assert_array_equal(mirrored.hand[order], swapped)
+    np.testing.assert_array_equal(mirrored.start[order], fingering.start)
     np.testing.assert_array_equal(mirrored.stop[order], fingering.stop)
     np.testing.assert_array_equal(mirrored.finger[order], fingering.finger)
 
