@@ -13,7 +13,8 @@ what is reported is an upper bound. A key-frame is out of reach by
 
 The largest set of keys that can be held is searched exactly. F1 is that of a player who holds it
 in every frame and presses nothing else. Notes out of reach are counted at onsets: of the keys
-struck in the same frame, those beyond the largest set.
+struck in the same frame, those beyond the largest set. Beside it stands the F1 of what our own
+fingering gives to fingers: how far from the bound the search for it stays.
 """
 
 from __future__ import annotations
@@ -30,8 +31,10 @@ import numpy as np
 
 import common
 from pianomime.music import Score, frame_metrics
+from pianomime.plan.fingering import find_fingering
 from pianomime.plan.fingertip_plan import FINGERS, LEFT, RIGHT
 from pianomime.plan.reach import pair_limits
+from pianomime.plan.zero_shot import finger_keys
 from pianomime.play import excerpt
 from pianomime.song_files import find_songs
 from pianomime.world.figures import BLACK, KEYS, key_centres, key_half_sizes
@@ -143,6 +146,7 @@ class Bound:
         over_ten: key-frames beyond ten at once.
         lost, lost_notes: key-frames and notes out of reach, by count and reach together.
         f1: of the player who holds the rest.
+        planned: of one who holds what our fingering gives to fingers, when it does.
     """
 
     cells: int
@@ -151,6 +155,7 @@ class Bound:
     lost: int
     lost_notes: int
     f1: float
+    planned: float
 
 
 def bound(song: Path, hands: Hands) -> Bound:
@@ -165,6 +170,10 @@ def bound(song: Path, hands: Hands) -> Bound:
     first = score.note_frames()[:, 0]
     struck = [tuple(np.unique(score.key[first == frame]).tolist()) for frame in np.unique(first)]
     count = wanted.sum(axis=1)
+    planned = np.zeros_like(wanted)
+    fingers = finger_keys(score, find_fingering(score))
+    frame, hand, finger = np.nonzero(fingers >= 0)
+    planned[frame, fingers[frame, hand, finger]] = True
     return Bound(
         cells=int(count.sum()),
         notes=sum(map(len, struck)),
@@ -172,6 +181,7 @@ def bound(song: Path, hands: Hands) -> Bound:
         lost=int((wanted & ~held).sum()),
         lost_notes=sum(len(keys) - hands.most(keys) for keys in struck),
         f1=frame_metrics(wanted, held).f1,
+        planned=frame_metrics(wanted, planned).f1,
     )
 
 
@@ -201,6 +211,7 @@ def main() -> None:
         [
             "set", "songs", "keys beyond ten %", "key-frames out of reach %, middle", "edge",
             "notes out of reach %, middle", "edge", "F1 at most, middle", "edge", "lowest, edge",
+            "F1 of our fingering",
         ],
         rows,
     )  # fmt: skip
@@ -232,6 +243,7 @@ def _row(name: str, middle: list[Bound], edge: list[Bound]) -> list[Any]:
         *(percent(sum(song.lost_notes for song in songs), notes) for songs in both),
         *(round(float(np.mean([song.f1 for song in songs])), 4) for songs in both),
         round(min(song.f1 for song in edge), 4),
+        round(float(np.mean([song.planned for song in edge])), 4),
     ]
 
 
