@@ -126,6 +126,8 @@ def test_one_hand_is_enough(video, midi, hands, plane, plan, monkeypatch):
     made = retarget(video, RetargetConfig(midi=midi, hand_model=hands))
     assert "only one hand is seen: the left one is made up, at rest" in made.remarks
     assert made.demonstration.quality["right_hand_found"] > 0.9
+    # What the right hand plays is not given to the other one.
+    assert (made.fingers.hand[made.demonstration.score.key > 36] == 1).all()
 
 
 def test_an_interruption_leaves_nothing(video, midi, hands, tmp_path, monkeypatch):

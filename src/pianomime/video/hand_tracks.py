@@ -31,6 +31,8 @@ _STRAY = 0.025
 """[m] A point this far from where its neighbours in time have it was seen wrongly."""
 _SMOOTH = 5
 """Frames that are smoothed together, with a parabola, which has no lag."""
+FEWEST = 0.05
+"""Share of the frames in which a hand must be seen to be one: less are ghosts."""
 _AT_EASE = np.array(
     [[0.19, 0.0], [0.055, 0.1], [0.0, 0.03], [-0.005, 0.0], [0.0, -0.025], [0.01, -0.05]]
 )
@@ -43,7 +45,8 @@ class HandTracks:
 
     Attributes:
         points: (T, 2, 6, 2) world x, y [m]; hands (left, right); points as in `plan.POINTS`.
-        found: (T, 2) bool, hands that were seen in a frame; the others are filled in.
+        found: (T, 2) bool, hands that were seen in a frame; the others are filled in. A hand that
+            is hardly ever seen (`FEWEST`) is taken for a ghost: it is never found, and made up.
         mended: (T, 2, 6) bool, points that were seen but wrongly, and filled in.
         ghosts: number of sightings that were taken for no hand.
         swaps: number of frames in which MediaPipe took left for right.
@@ -58,6 +61,16 @@ class HandTracks:
     def __len__(self) -> int:
         """Number of frames."""
         return len(self.points)
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(2,) hands that are there; the others are made up and play nothing."""
+        return np.asarray(self.found.any(axis=0))
+
+    def seen_points(self, step: int = 1) -> NDArray[np.float64]:
+        """(ceil(T / step), H, 6, 2) `points` of the H hands that are there, in every step-th frame."""
+        points = self.points[::step]
+        return points if self.seen.all() else points[:, self.seen]
 
 
 def follow(
@@ -91,6 +104,10 @@ def follow(
         swaps += swapped
         ghosts += len(hands) - sum(which >= 0 for which in pick)
     found = np.isfinite(points).all(axis=(2, 3))
+    for hand in (LEFT, RIGHT):
+        if found[:, hand].mean() < FEWEST:
+            ghosts += int(found[:, hand].sum())
+            points[:, hand], found[:, hand] = np.nan, False
     mended = np.zeros(points.shape[:3], bool)
     for hand in (LEFT, RIGHT):
         points[:, hand], mended[:, hand] = _repair(points[:, hand], hand)

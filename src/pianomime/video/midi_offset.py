@@ -54,7 +54,7 @@ def estimate_offset(
         light: (T, zones, 88, 3), see `KeyLight`.
         given: the offset, if it is known: then only how well it fits is found out.
     """
-    points = tracks.points
+    points = tracks.seen_points()
     touched, counts, lags = _correlate(
         lambda key: touching(points, key) > np.exp(-1.0), len(points), score
     )

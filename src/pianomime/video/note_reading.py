@@ -52,7 +52,8 @@ def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> Read
         tracks: the hands.
         title: of the score.
     """
-    near = np.stack([touching(tracks.points, key) > _TOUCHED for key in range(KEYS)], axis=1)
+    points = tracks.seen_points()
+    near = np.stack([touching(points, key) > _TOUCHED for key in range(KEYS)], axis=1)
     best: tuple[float, NDArray[np.int64], bool] = (0.0, np.zeros((0, 3), np.int64), True)
     for zone, colourful, share in product(range(len(ZONES)), (True, False), _SHARES):
         glow = Glow(light, zone, colourful)

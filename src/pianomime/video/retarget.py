@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.music import KEYS, Score
-from pianomime.plan import LEFT
+from pianomime.plan import LEFT, RIGHT
 from pianomime.video.align import Rule, align
 from pianomime.video.demonstration import Demonstration, on_grid
 from pianomime.video.film import Film
@@ -33,8 +33,6 @@ from pianomime.video.stretches import RATE, stretches
 Tell = Callable[[str, int, int], None]
 
 _BACKGROUND_FRAMES = 25
-_FEWEST_HANDS = 0.05
-"""Share of the frames in which a hand must be seen for the video to be one of playing."""
 _TOO_FEW_TOUCHED = 0.5
 """Share of a MIDI file's notes with a finger on their key below which it is of another song."""
 _FEW_TOUCHED = 0.7
@@ -130,9 +128,9 @@ def retarget(
     score, facts = _score(film, score, offset, tracks, light, config, remarks)
     frames = score.frames()
     points = _rows(tracks.points, frames)
-    fingers = find_note_fingers(score, points)
+    fingers = find_note_fingers(score, points, tracks.seen)
     straight = without_parallax(points, score, fingers)
-    fingers = find_note_fingers(score, straight.points)
+    fingers = find_note_fingers(score, straight.points, tracks.seen)
     plan = align(score, straight.points, fingers, config.align)
     if fingers.guessed.any():
         remarks.append(
@@ -223,11 +221,10 @@ def _best_way(
 
 
 def _check_hands(video: Path, tracks: HandTracks, remarks: list[str]) -> None:
-    share = tracks.found.mean(axis=0)
-    if share.max(initial=0.0) < _FEWEST_HANDS:
+    if not tracks.seen.any():
         raise InputError(f"{video}: no hands are seen playing")
-    for hand, name in ((0, "left"), (1, "right")):
-        if share[hand] < _FEWEST_HANDS:
+    for hand, name in ((LEFT, "left"), (RIGHT, "right")):
+        if not tracks.seen[hand]:
             remarks.append(f"only one hand is seen: the {name} one is made up, at rest")
 
 
