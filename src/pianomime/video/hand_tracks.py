@@ -15,6 +15,7 @@ from scipy.signal import savgol_filter
 from pianomime.plan import LEFT, RIGHT
 from pianomime.video.plane import Plane
 from pianomime.video.sightings import Sighting, Sightings
+from pianomime.video.strays import strays
 from pianomime.video.stretches import stretches
 
 _SAME_HAND = 0.05
@@ -68,7 +69,7 @@ class HandTracks:
         return np.asarray(self.found.any(axis=0))
 
     def seen_points(self, step: int = 1) -> NDArray[np.float64]:
-        """(ceil(T / step), H, 6, 2) `points` of the H hands that are there, in every step-th frame."""
+        """(ceil(T / step), H, 6, 2) of the H hands that are there, in every step-th frame."""
         points = self.points[::step]
         return points if self.seen.all() else points[:, self.seen]
 
@@ -239,21 +240,17 @@ def _repair(
         side = -1 if hand == LEFT else 1
         place = _AT_EASE * [1, 1 if hand == LEFT else -1] + [0.0, 0.2 * side]
         return np.broadcast_to(place, points.shape).copy(), stray
-    if frames >= 3:
-        between = (points[:-2] + points[2:]) / 2
-        off = np.linalg.norm(points[1:-1] - between, axis=2)
-        still = np.linalg.norm(points[2:] - points[:-2], axis=2)
-        # A quick move is not a stray: there, before and after are apart.
-        stray[1:-1] = off > _STRAY + still
-    filled = points.copy()
-    filled[stray] = np.nan
+    filled = np.empty_like(points)
     time = np.arange(frames)
+    # Point by point: hours of all of them at once take much memory.
     for point in range(6):
+        stray[:, point] = strays(points[:, point], _STRAY)
+        known = np.isfinite(points[:, point]).all(axis=1) & ~stray[:, point]
         for axis in range(2):
-            known = np.isfinite(filled[:, point, axis])
-            filled[:, point, axis] = np.interp(time, time[known], filled[known, point, axis])
-    if frames >= _SMOOTH:
-        filled = savgol_filter(filled, _SMOOTH, 2, axis=0, mode="interp")
+            course = np.interp(time, time[known], points[known, point, axis])
+            if frames >= _SMOOTH:
+                course = savgol_filter(course, _SMOOTH, 2, mode="interp")
+            filled[:, point, axis] = course
     return filled, stray
 
 
