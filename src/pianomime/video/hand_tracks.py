@@ -237,9 +237,7 @@ def _repair(
     frames = len(points)
     stray = np.zeros((frames, 6), bool)
     if not np.isfinite(points).any():
-        side = -1 if hand == LEFT else 1
-        place = _AT_EASE * [1, 1 if hand == LEFT else -1] + [0.0, 0.2 * side]
-        return np.broadcast_to(place, points.shape).copy(), stray
+        return np.broadcast_to(at_rest(hand), points.shape).copy(), stray
     filled = np.empty_like(points)
     time = np.arange(frames)
     # Point by point: hours of all of them at once take much memory.
@@ -252,6 +250,12 @@ def _repair(
                 course = savgol_filter(course, _SMOOTH, 2, mode="interp")
             filled[:, point, axis] = course
     return filled, stray
+
+
+def at_rest(hand: int) -> NDArray[np.float64]:
+    """(6, 2) world x, y [m] of a hand that was never seen."""
+    side = -1 if hand == LEFT else 1
+    return _AT_EASE * [1, -side] + [0.0, 0.2 * side]
 
 
 def poorly_seen(tracks: HandTracks) -> list[tuple[float, float, int]]:
