@@ -58,6 +58,17 @@ def test_notes_are_read_off_light_that_spills(score, points):
     assert read.score.title == "read"
 
 
+def test_a_key_that_is_down_most_of_the_time_is_read(score, points):
+    """The left little finger holds a key from 1.2 s on, and lies elsewhere before."""
+    held = Score([10], [1.2], [len(points) / 20], [80])
+    holding = points.copy()
+    holding[:, 0, 5] = key_centres()[4, :2]
+    holding[24:, 0, 5] = key_centres()[10, :2]
+    light = np.maximum(lamps(score, len(points)), lamps(held, len(points), 0.0))
+    read = read_notes(light, tracks(holding), "read").score
+    assert read.onset[read.key == 10] == pytest.approx([1.2], abs=0.051)
+
+
 def test_notes_are_read_off_keys_that_go_down(score, points):
     """They get darker, and so does, now and then, a key that no finger is on."""
     light = np.full((len(points), 3, 88, 3), 200, np.uint8)
