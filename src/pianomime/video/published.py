@@ -196,7 +196,7 @@ def _zarr(folder: Path) -> list[_Clip]:
         zarr: Any = importlib.import_module("zarr")
     except ImportError as error:
         raise InputError(
-            f"{folder}: reading it needs the package zarr: pip install 'pianomime[video]'"
+            f"{folder}: reading it needs the package zarr: pip install -e '.[video]'"
         ) from error
     wanted = f"{folder}: not PianoMime's high-level data set"
     try:
