@@ -132,7 +132,7 @@ def _mend(tips: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
         bad[:, hand, point] |= strays(tips[:, hand, point, :2], _JUMP)
     # A finger that presses is where its key is.
     bad &= tips[..., 2] != 0.0
-    unknown = ~np.isfinite(tips).all(axis=3)
+    unknown: NDArray[np.bool_] = ~np.all(np.isfinite(tips), axis=3)
     bad |= unknown
     mended = tips.copy()
     time = np.arange(len(tips))
