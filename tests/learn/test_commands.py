@@ -69,6 +69,9 @@ def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> 
     assert "not the folder of a run" in fails(["play", "demo.npz", "--player", "other"], capsys)
     main(["train-expert", "demo.npz", "--method", "search", "-o", "run", *QUICK])
     capsys.readouterr()
+    assert "--start: an expert" in fails(
+        ["play", "demo.npz", "--player", "run", "--start", "1"], capsys
+    )
     assert "not the score" in fails(["play", "ode-to-joy", "--player", "run", "--no-video"], capsys)
     assert "no runs" in fails(["collect"], capsys)
     assert "no demonstrations" in fails(["train-experts", "other"], capsys)
