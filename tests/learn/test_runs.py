@@ -147,7 +147,11 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(
 
 @pytest.mark.parametrize("left", [(), ("song.npz",)])
 def test_a_run_that_was_killed_at_its_beginning_begins_anew(
-    demo: Path, tmp_path: Path, small_search: ExpertConfig, left: tuple[str, ...]
+    demo: Path,
+    two_notes: Demonstration,
+    tmp_path: Path,
+    small_search: ExpertConfig,
+    left: tuple[str, ...],
 ) -> None:
     whole, out = tmp_path / "whole", tmp_path / "run"
     train_expert(demo, whole, small_search)
@@ -161,6 +165,13 @@ def test_a_run_that_was_killed_at_its_beginning_begins_anew(
     again = train_expert(demo, out, small_search)
     assert again.curve() == RunFolder.load(whole).curve()
     assert not [name for name in os.listdir(out) if name.startswith(".")]
+    # A song of somebody else is no beginning.
+    (tmp_path / "theirs").mkdir()
+    two_notes.save(tmp_path / "theirs" / "song.npz")
+    before = (tmp_path / "theirs" / "song.npz").read_bytes()
+    with pytest.raises(InputError, match="something else"):
+        train_expert(demo, tmp_path / "theirs", small_search)
+    assert (tmp_path / "theirs" / "song.npz").read_bytes() == before
     # Also when it goes on; what is not ours stays.
     for name in (".state-0000", ".mine"):
         (out / name).mkdir()

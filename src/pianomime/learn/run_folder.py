@@ -72,12 +72,16 @@ class RunFolder:
         if not (path / _ABOUT).exists():
             if path.is_file():
                 raise InputError(f"{path}: is a file; a folder is needed")
-            left = {file.name for file in path.iterdir()} if path.is_dir() else set()
-            if left - {_SONG, *_temporaries(path)}:
-                raise InputError(f"{path}: holds something else than a run; name another folder")
             path.mkdir(parents=True, exist_ok=True)
+            left = {file.name for file in path.iterdir()} - {*_temporaries(path)}
+            # The song comes first; another one of that name is somebody's.
+            if left and not (
+                left == {_SONG} and _same_song(Demonstration.load(path / _SONG), song)
+            ):
+                raise InputError(f"{path}: holds something else than a run; name another folder")
             _sweep(path)
-            song.save(path / _SONG)
+            if not left:
+                song.save(path / _SONG)
             run = cls(path, song, config, start, seconds)
             run._write_about()
             return run
