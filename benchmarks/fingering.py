@@ -2,7 +2,8 @@
 
 Needs the reference data (PIANOMIME_SHARED names their folder): the fingered pieces of two sets,
 whole, and the held-out clips of pianists, whose fingering was read off their hands. The search's
-costs are set by hand and fitted to none of them.
+costs are set by hand, for the F1 of what is played, and fitted to none of these fingerings
+(`fit_fingering.py` tries whether that would help).
 
 - played: the share of the notes that the search gives to some finger.
 - same hand, same finger: the share of all notes with the same hand, or hand and finger, as in the

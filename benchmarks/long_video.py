@@ -3,9 +3,10 @@
     python benchmarks/long_video.py --hours 0.5 1 4
 
 A minute of made-up playing (640 x 360, 20 frames/s, keys light up) over and over, with a MIDI file
-and without. In MediaPipe's place stands one who knows where the hands were drawn; its own memory
-does not depend on the length, and is measured in 32 s of the real thing by `retarget.py`. Each
-length has a process of its own, whose greatest resident memory is told.
+and without. In MediaPipe's place stands one who knows where the hands were drawn; what
+MediaPipe itself takes comes on top, and is not measured here. The whole keyboard is seen: where a
+part is, and a MIDI file decides the octave, each octave that it may be takes memory of its own.
+Each length has a process of its own, whose greatest resident memory is told.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ the fingertips of a hand at ease lie, from its middle finger. About a minute on 
 
 from __future__ import annotations
 
+import argparse
 import json
 from concurrent.futures import ProcessPoolExecutor
 from itertools import combinations, product
@@ -69,6 +70,9 @@ def _xs(black: bool) -> tuple[float, ...]:
 
 
 def main() -> None:
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     hand = Hand("rh")
     along = hand.points(np.clip(HOME, hand.low, hand.high))[1:, 1]
     colours = list(product((False, True), repeat=2))

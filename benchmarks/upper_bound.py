@@ -7,13 +7,14 @@ what is reported is an upper bound. A key-frame is out of reach by
 - count: there are more than ten keys to hold, or
 - reach: no choice of fingers can hold them all at once. Each hand holds at most five keys, a
   finger one key, fingers in order along the keyboard, and every two fingers of a hand no further
-  apart than inverse kinematics of the hand can take them, both within 3 mm of their targets on
-  white or black keys. Two numbers: with the fingers in the middle of their keys, and with each at
-  the edge that suits it best (no finger can do more: the bound).
+  apart than inverse kinematics of the hand can take them (`benchmarks/reach.py`). Two numbers:
+  with the fingers in the middle of their keys, and with each at the edge that suits it best (no
+  finger can do more: the bound).
 
 The largest set of keys that can be held is searched exactly. F1 is that of a player who holds it
 in every frame and presses nothing else. Notes out of reach are counted at onsets: of the keys
-struck in the same frame, those beyond the largest set.
+struck in the same frame, those beyond the largest set. Beside it stands the F1 of what our own
+fingering gives to fingers: how far from the bound the search for it stays.
 """
 
 from __future__ import annotations
@@ -30,12 +31,13 @@ import numpy as np
 
 import common
 from pianomime.music import Score, frame_metrics
+from pianomime.plan.fingering import find_fingering
 from pianomime.plan.fingertip_plan import FINGERS, LEFT, RIGHT
-from pianomime.plan.joint_path import BLACK_REST, WHITE_REST, PathConfig, smooth_path
+from pianomime.plan.reach import pair_limits
+from pianomime.plan.zero_shot import finger_keys
 from pianomime.play import excerpt
 from pianomime.song_files import find_songs
-from pianomime.world.figures import BLACK, HAND_JOINTS, KEYS, key_centres, key_half_sizes
-from pianomime.world.hand import Hand
+from pianomime.world.figures import BLACK, KEYS, key_centres, key_half_sizes
 
 _SETS = {
     "modern": ("modern/test12", None),
@@ -44,56 +46,18 @@ _SETS = {
     "pop": ("pop/test12", None),
     "giantmidi": ("giantmidi", 50),
 }
-_WITHIN = 0.003  # [m]
-_STEP = 0.003  # [m] of the distances tried
-_NARROWEST, _WIDEST = 0.06, 0.33  # [m]; any two fingers reach the one, none the other
-_WHITE_X = (0.030, 0.050, 0.070)  # [m] where a white key is struck, in front of the black ones
-_BLACK_X = (-0.065, -0.025, 0.010)
-_PRESSED = 0.009  # [m] that a fingertip goes down with its key
 
 Reach = dict[tuple[int, int, bool, bool], float]
 """How far apart [m] two fingers can be, by lower and upper finger and whether each is on black."""
 
 
-def find_reach() -> Reach:
+def reach_of_hands() -> Reach:
     """The reach of a right hand, thumb on the bass side; that of the left is its mirror image."""
-    colours = list(product((False, True), repeat=2))
-    pairs = [(*fingers, *on) for fingers in combinations(range(5), 2) for on in colours]
-    with ProcessPoolExecutor(len(common.cores())) as pool:
-        return dict(zip(pairs, pool.map(_reach, *zip(*pairs, strict=True)), strict=True))
-
-
-def _reach(low: int, high: int, low_black: bool, high_black: bool) -> float:
-    """The largest distance [m] at which two fingers come within `_WITHIN` of their targets."""
-    hand = Hand("rh")
-    # Posture hardly counts: what the joints allow is asked, not what is comfortable.
-    config = PathConfig(
-        posture=30.0, slide_posture=1.0, coupling=0.5, damping=0.5, iterations=30,
-        joint_acceleration=1e6, slide_acceleration=1e6,
-    )  # fmt: skip
-    distances = np.arange(_NARROWEST, _WIDEST, _STEP)
-    best = 0.0
-    for low_x, high_x in product(_xs(low_black), _xs(high_black)):
-        targets = np.zeros((len(distances), 6, 3))
-        weights = np.zeros((len(distances), 6, 3))
-        for finger, x, black, side in (
-            (low, low_x, low_black, -0.5),
-            (high, high_x, high_black, 0.5),
-        ):
-            height = (BLACK_REST if black else WHITE_REST) - _PRESSED
-            targets[:, 1 + finger] = [x, 0.0, height]
-            targets[:, 1 + finger, 1] = side * distances
-            weights[:, 1 + finger] = 1 / 0.0005
-        clearance = np.full((len(distances), 5), np.nan)
-        path = smooth_path(hand, np.zeros(HAND_JOINTS), targets, weights, clearance, config)
-        points = np.array([hand.points(pose) for pose in path[1:]])
-        error = np.linalg.norm((points - targets)[:, [1 + low, 1 + high]], axis=-1).max(axis=1)
-        best = max(best, float(distances[error <= _WITHIN].max(initial=0.0)))
-    return best
-
-
-def _xs(black: bool) -> tuple[float, ...]:
-    return _BLACK_X if black else _WHITE_X
+    return {
+        (low, high, low_black, high_black): pair_limits(low, high, low_black, high_black)[1]
+        for low, high in combinations(range(5), 2)
+        for low_black, high_black in product((False, True), repeat=2)
+    }
 
 
 @dataclass(frozen=True)
@@ -182,6 +146,7 @@ class Bound:
         over_ten: key-frames beyond ten at once.
         lost, lost_notes: key-frames and notes out of reach, by count and reach together.
         f1: of the player who holds the rest.
+        planned: of one who holds what our fingering gives to fingers, when it does.
     """
 
     cells: int
@@ -190,6 +155,7 @@ class Bound:
     lost: int
     lost_notes: int
     f1: float
+    planned: float
 
 
 def bound(song: Path, hands: Hands) -> Bound:
@@ -204,6 +170,10 @@ def bound(song: Path, hands: Hands) -> Bound:
     first = score.note_frames()[:, 0]
     struck = [tuple(np.unique(score.key[first == frame]).tolist()) for frame in np.unique(first)]
     count = wanted.sum(axis=1)
+    planned = np.zeros_like(wanted)
+    fingers = finger_keys(score, find_fingering(score))
+    frame, hand, finger = np.nonzero(fingers >= 0)
+    planned[frame, fingers[frame, hand, finger]] = True
     return Bound(
         cells=int(count.sum()),
         notes=sum(map(len, struck)),
@@ -211,6 +181,7 @@ def bound(song: Path, hands: Hands) -> Bound:
         lost=int((wanted & ~held).sum()),
         lost_notes=sum(len(keys) - hands.most(keys) for keys in struck),
         f1=frame_metrics(wanted, held).f1,
+        planned=frame_metrics(wanted, planned).f1,
     )
 
 
@@ -219,7 +190,7 @@ def main() -> None:
     data = common.shared() / "data"
     facts = common.machine()
     common.show_machine(facts)
-    reach = find_reach()
+    reach = reach_of_hands()
     print("How far apart two fingers of a hand can hold keys [mm]:\n")
     spans = _spans(reach)
     common.table(["fingers", "both white", "white, black", "black, white", "both black"], spans)
@@ -240,6 +211,7 @@ def main() -> None:
         [
             "set", "songs", "keys beyond ten %", "key-frames out of reach %, middle", "edge",
             "notes out of reach %, middle", "edge", "F1 at most, middle", "edge", "lowest, edge",
+            "F1 of our fingering",
         ],
         rows,
     )  # fmt: skip
@@ -271,6 +243,7 @@ def _row(name: str, middle: list[Bound], edge: list[Bound]) -> list[Any]:
         *(percent(sum(song.lost_notes for song in songs), notes) for songs in both),
         *(round(float(np.mean([song.f1 for song in songs])), 4) for songs in both),
         round(min(song.f1 for song in edge), 4),
+        round(float(np.mean([song.planned for song in edge])), 4),
     ]
 
 

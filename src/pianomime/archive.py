@@ -1,4 +1,4 @@
-"""Reading the .npz files that we wrote."""
+"""Reading .npz files, those that we wrote among them."""
 
 from __future__ import annotations
 
@@ -12,6 +12,28 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 
 _Made = TypeVar("_Made")
+
+
+def read_arrays(path: str | os.PathLike[str], kind: str) -> dict[str, NDArray[Any]]:
+    """The arrays in a file.
+
+    Args:
+        path: the .npz file.
+        kind: what it should be, such as "a performance".
+
+    Raises:
+        OSError: there is no such file, or it cannot be read.
+        InputError: it holds no arrays, or is damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return dict(file)
+    except (FileNotFoundError, IsADirectoryError, PermissionError):
+        raise
+    except Exception as error:
+        # On damaged data zipfile, zlib and numpy raise all kinds of errors, and what they say,
+        # such as to allow pickles, is no advice for a user.
+        raise InputError(f"{path}: not {kind}, or a damaged one") from error
 
 
 def read_archive(
@@ -33,16 +55,11 @@ def read_archive(
         InputError: it is not of the kind, or of a version that we do not know.
     """
     name, known = version
+    arrays = read_arrays(path, kind)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
         found = int(arrays[name])
         made = make(arrays) if found == known else None
-    except (FileNotFoundError, IsADirectoryError, PermissionError):
-        raise
-    except Exception as error:
-        # On damaged data zipfile, zlib and numpy raise all kinds of errors, and what they say,
-        # such as to allow pickles, is no advice for a user.
+    except Exception as error:  # arrays of another kind make all kinds of errors
         raise InputError(f"{path}: not {kind}, or a damaged one") from error
     if made is None:
         raise InputError(

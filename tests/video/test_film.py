@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import io
+import struct
 import wave
 
 import av
 import made_up_video as made_up
 import numpy as np
 import pytest
+from PIL import Image
 
 from pianomime.errors import InputError
 from pianomime.video.film import Film
@@ -62,6 +65,51 @@ def test_samples_are_from_all_over(tmp_path):
     level = [picture.mean() for picture in film.sample(12)]
     assert len(level) == 12
     assert len(np.unique(np.round(level))) > 3
+
+
+def test_samples_of_a_video_that_does_not_say_how_long_it_is(tmp_path):
+    whole = clock(tmp_path / "whole.mkv", made_up.times(4.0, 30))
+    piped = io.BytesIO()
+    piped.seekable = lambda: False
+    with av.open(str(whole)) as source, av.open(piped, "w", format="matroska") as copy:
+        stream = copy.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                copy.mux(packet)
+    path = tmp_path / "piped.mkv"
+    path.write_bytes(piped.getvalue())
+    film = Film(path)
+    assert film.seconds == 0
+    level = np.array([picture.mean() for picture in film.sample(12)])
+    assert 6 <= len(level) <= 12
+    assert level[0] < 30
+    assert level[-1] > 20 + 50 * 3
+
+
+def test_a_cover_is_not_the_video(tmp_path):
+    """A cover that comes first, for the box that names it lies before that of the video."""
+
+    def box(kind, content):
+        return struct.pack(">I", 8 + len(content)) + kind + content
+
+    picture = io.BytesIO()
+    Image.new("RGB", (32, 32)).save(picture, "png")
+    cover = box(b"covr", box(b"data", struct.pack(">II", 14, 0) + picture.getvalue()))
+    handler = box(b"hdlr", bytes(8) + b"mdirappl" + bytes(9))
+    named = box(b"udta", box(b"meta", bytes(4) + handler + box(b"ilst", cover)))
+    plain = clock(tmp_path / "plain.mp4", made_up.times(1.0, 20)).read_bytes()
+    at = plain.rindex(b"moov") - 4
+    (size,) = struct.unpack(">I", plain[at : at + 4])
+    moov = box(b"moov", named + plain[at + 8 : at + size])
+    path = tmp_path / "covered.mp4"
+    path.write_bytes(plain[:at] + moov + plain[at + size :])
+    with av.open(str(path)) as container:
+        assert container.streams.video[0].width == 32
+    film = Film(path)
+    assert (film.width, film.height) == (64, 48)
+    assert len(list(film.frames(20))) == 20
+    assert film.sample(3)[0].shape == (48, 64, 3)
 
 
 def test_damaged_end_is_left_out(tmp_path):

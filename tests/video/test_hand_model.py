@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import io
 import subprocess
 import sys
+from http.client import IncompleteRead
 
 import pytest
 
@@ -41,6 +43,16 @@ def test_offline_it_says_what_to_do(server):
     with pytest.raises(InputError, match="--hand-model") as caught:
         find_hand_model(url=server.as_uri())
     assert "\n" not in str(caught.value)
+
+
+def test_a_download_that_is_cut_off(server, monkeypatch):
+    class CutOff(io.BytesIO):
+        def read(self, *_):
+            raise IncompleteRead(b"half")
+
+    monkeypatch.setattr(hand_model.urllib.request, "urlopen", lambda *_, **__: CutOff())
+    with pytest.raises(InputError, match="--hand-model"):
+        find_hand_model(url=server.as_uri())
 
 
 def test_a_wrong_download_is_refused(server, tmp_path):

@@ -110,3 +110,16 @@ def test_no_hands_and_one_hand(truth):
     one = follow([frame[:1] for frame in seen(truth)], SIZE, made_up.camera())
     assert one.found.all(axis=0).tolist() == [True, False]
     assert (one.points[:, RIGHT, :, 1] > one.points[:, LEFT, :, 1].mean()).any()
+    assert one.seen_points().shape[1] == 1
+
+
+def test_a_hand_that_flashes_up_is_a_ghost(truth):
+    sightings = seen(truth)
+    for frame in range(len(sightings)):
+        if frame not in (20, 150):
+            sightings[frame] = sightings[frame][1:]
+    tracks = follow(sightings, SIZE, made_up.camera())
+    assert tracks.seen.tolist() == [False, True]
+    assert tracks.ghosts == 2
+    assert not tracks.found[:, LEFT].any()
+    assert np.ptp(tracks.points[:, LEFT], axis=0).max() == 0

@@ -15,6 +15,7 @@ from pianomime.video.parallax import without_parallax
 from pianomime.world.figures import key_centres
 
 DARK = 40
+BOTH = np.array([True, True])
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +56,17 @@ def test_notes_are_read_off_light_that_spills(score, points):
     assert read.touched > 0.9
     assert read.lit
     assert read.score.title == "read"
+
+
+def test_a_key_that_is_down_most_of_the_time_is_read(score, points):
+    """The left little finger holds a key from 1.2 s on, and lies elsewhere before."""
+    held = Score([10], [1.2], [len(points) / 20], [80])
+    holding = points.copy()
+    holding[:, 0, 5] = key_centres()[4, :2]
+    holding[24:, 0, 5] = key_centres()[10, :2]
+    light = np.maximum(lamps(score, len(points)), lamps(held, len(points), 0.0))
+    read = read_notes(light, tracks(holding), "read").score
+    assert read.onset[read.key == 10] == pytest.approx([1.2], abs=0.051)
 
 
 def test_notes_are_read_off_keys_that_go_down(score, points):
@@ -120,7 +132,7 @@ def test_another_song_does_not_match(points):
 
 def test_fingers_are_those_that_were_there(score, plan, points):
     noisy = points + np.random.default_rng(0).normal(0, 0.002, points.shape)
-    found = find_note_fingers(score, noisy)
+    found = find_note_fingers(score, noisy, BOTH)
     played = plan.note_hand >= 0
     same = (found.hand == plan.note_hand) & (found.finger == plan.note_finger)
     assert same[played].mean() > 0.97
@@ -129,12 +141,28 @@ def test_fingers_are_those_that_were_there(score, plan, points):
 
 def test_no_finger_plays_two_keys_at_once(points):
     chord = Score([40, 41, 42, 43, 44, 45], [1.0] * 6, [2.0] * 6, [80] * 6)
-    found = find_note_fingers(chord, points[:41])
+    found = find_note_fingers(chord, points[:41], BOTH)
     assert len(set(zip(found.hand.tolist(), found.finger.tolist(), strict=True))) == 6
 
 
+def test_a_key_struck_again_in_the_last_frame(points):
+    again = Score([40, 40], [0.5, 1.96], [1.96, 1.98], [80, 80])
+    found = find_note_fingers(again, points[: again.frames()], BOTH)
+    assert np.isfinite(found.misfit).all()
+
+
+def test_a_hand_that_is_made_up_plays_only_what_is_far_from_the_other(score, plan, points):
+    right = np.array([False, True])
+    played = plan.note_hand == 1
+    lying = points.copy()
+    lying[:, 0] = points[:, 1]  # it would fit as well
+    found = find_note_fingers(score, lying, right)
+    assert (found.hand[played] == 1).all()
+    assert found.guessed[found.hand == 0].all()
+
+
 def test_steady_alignment(score, points):
-    fingers = find_note_fingers(score, points)
+    fingers = find_note_fingers(score, points, BOTH)
     plan = align(score, points, fingers)
     frame, hand, finger = np.nonzero(plan.finger_key != NO_KEY)
     tips = plan.fingertips[frame, hand, finger + 1]
@@ -153,7 +181,7 @@ def test_steady_alignment(score, points):
 def test_parallax_is_taken_back(score, points):
     bent = points.copy()
     bent[..., 1] = 1.03 * bent[..., 1] + 0.003
-    fingers = find_note_fingers(score, points)
+    fingers = find_note_fingers(score, points, BOTH)
     straight = without_parallax(bent, score, fingers)
     before = np.abs(bent - points)[..., 1].mean()
     assert np.abs(straight.points - points)[..., 1].mean() < 0.6 * before

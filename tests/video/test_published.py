@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import contextlib
+
 import made_up_video as made_up
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ import pytest
 from pianomime import cli
 from pianomime.errors import InputError
 from pianomime.plan import NO_KEY
+from pianomime.video import published
 from pianomime.video.demonstration import Demonstration
 from pianomime.video.published import demonstration_of, read_published
 from pianomime.world.figures import key_centres
@@ -121,8 +124,58 @@ def test_what_is_no_data(tmp_path):
     wrong = tmp_path / "wrong.npz"
     np.savez(wrong, fingertips=np.zeros((5, 2, 6, 3)), length=np.array([9]))
     for path in (empty, wrong, tmp_path / "nowhere.npz", tmp_path):
+        with pytest.raises((InputError, OSError)):
+            list(read_published(path))
+
+
+def test_damaged_and_odd_arrays(clip, tmp_path):
+    tips, goal, _ = clip
+    path = tmp_path / "odd.npz"
+    for odd in (
+        {"goal_packed": np.zeros(len(tips), np.uint8)},
+        {"goal_packed": goal},
+        {"length": np.array([-1, len(tips) + 1])},
+        {"fingertips": np.zeros(())},
+        {"fingertips": tips.astype(str)},
+    ):
+        np.savez(path, **({"fingertips": tips} | odd))
         with pytest.raises(InputError):
             list(read_published(path))
+    np.savez_compressed(path, fingertips=tips, goal=goal)
+    whole = path.read_bytes()
+    for at in range(60, len(whole), len(whole) // 40):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        with contextlib.suppress(InputError):  # or it did no harm
+            list(read_published(path))
+
+
+def test_a_hand_that_was_never_seen(clip):
+    tips, goal, _ = clip
+    half = tips.copy()
+    half[:, 0] = np.nan
+    made = demonstration_of(half, goal, "a", "data")
+    assert np.isfinite(made.plan.fingertips).all()
+    assert (made.plan.finger_key[:, 0] == NO_KEY).all()
+
+
+def test_all_clips_or_none(clip, tmp_path, monkeypatch):
+    tips, _, _ = clip
+    source, out = tmp_path / "clips.npz", tmp_path / "demos"
+    np.savez(source, fingertips=np.concatenate((tips, tips)), length=np.array([len(tips)] * 2))
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["import-demos", str(source), "--clips", "-1", "-o", str(out)])
+    assert stopped.value.code == 2
+
+    def interrupted(*given, **named):
+        made = demonstration_of(*given, **named)
+        if made.score.title.endswith("001"):
+            raise KeyboardInterrupt
+        return made
+
+    monkeypatch.setattr(published, "demonstration_of", interrupted)
+    with pytest.raises(SystemExit):
+        cli.main(["import-demos", str(source), "-o", str(out)])
+    assert not out.exists()
 
 
 def test_the_published_ones(shared):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import av
 import made_up_video as made_up
 import numpy as np
@@ -97,6 +99,55 @@ def test_without_midi(video, hands, score):
     assert onset_f1((score.key, score.onset), (read.key, read.onset), 0.1) > 0.95
 
 
+@pytest.fixture
+def untouched(monkeypatch):
+    """Nothing that takes long may begin."""
+
+    def detector(_):
+        pytest.fail("looked for hands")
+
+    monkeypatch.setattr(room, "HandDetector", detector)
+
+
+def test_what_is_wrong_shows_before_the_work(video, midi, hands, tmp_path, capsys, untouched):
+    bad = tmp_path / "points.json"
+    bad.write_text("{}")
+    file = tmp_path / "file"
+    file.write_text("")
+    given = ["retarget", str(video), "--hand-model", str(hands), "--midi", str(midi)]
+    for more, why in (
+        (["--offset", "nan"], "--offset"),
+        (["--offset", "inf"], "--offset"),
+        (["--points", str(bad)], "points.json"),
+        (["-o", str(file / "demo.npz")], "a folder is needed"),
+    ):
+        with pytest.raises(SystemExit) as stopped:
+            cli.main([*given, *more])
+        assert stopped.value.code == 2
+        told = capsys.readouterr().err.strip()
+        assert why in told
+        assert "\n" not in told
+
+
+def test_too_long_a_video_shows_before_the_work(video, hands, monkeypatch, untouched):
+    monkeypatch.setattr(room, "MAX_SECONDS", 4.0)
+    with pytest.raises(room.InputError, match="longer than"):
+        retarget(video, RetargetConfig(hand_model=hands))
+
+
+def test_too_long_a_video_that_does_not_say_so(video, hands, monkeypatch):
+    monkeypatch.setattr(room, "_MOST_FRAMES", 60)
+    made = retarget(video, RetargetConfig(hand_model=hands))
+    assert len(made.tracks) == 60
+    assert any("left out" in remark for remark in made.remarks)
+
+
+def test_a_keyboard_whose_far_end_is_cut_off(video):
+    light = np.full((40, 3, 88, 3), 90, np.uint8)
+    light[:, 1] = 0
+    assert room._hidden(light) == []
+
+
 def test_another_song_is_noticed(video, hands, tmp_path, score):
     other = tmp_path / "other.mid"
     score.transpose(23).to_midi(other)
@@ -126,6 +177,8 @@ def test_one_hand_is_enough(video, midi, hands, plane, plan, monkeypatch):
     made = retarget(video, RetargetConfig(midi=midi, hand_model=hands))
     assert "only one hand is seen: the left one is made up, at rest" in made.remarks
     assert made.demonstration.quality["right_hand_found"] > 0.9
+    # What the right hand plays is not given to the other one.
+    assert (made.fingers.hand[made.demonstration.score.key > 36] == 1).all()
 
 
 def test_an_interruption_leaves_nothing(video, midi, hands, tmp_path, monkeypatch):
@@ -141,9 +194,10 @@ def test_an_interruption_leaves_nothing(video, midi, hands, tmp_path, monkeypatc
     assert not out.parent.exists()
 
 
-def test_the_video_is_not_overwritten(video, midi, hands, capsys):
+def test_the_video_is_not_overwritten(video, midi, hands, capsys, tmp_path):
     before = video.read_bytes()
-    given = ["--midi", str(midi), "--hand-model", str(hands), "-o", str(video.with_suffix(".npz"))]
+    video = shutil.copy(video, tmp_path / "demo-seen.mp4")
+    given = ["--midi", str(midi), "--hand-model", str(hands), "-o", str(tmp_path / "demo.npz")]
     for more in ([], ["--no-overlay"]):
         with pytest.raises(SystemExit) as stopped:
             cli.main(["retarget", str(video), *given, *more])
@@ -175,13 +229,19 @@ def test_a_cut_is_noticed(hands, tmp_path, score, plan, plane, midi):
 
 def test_the_command_writes_all_or_nothing(video, midi, hands, tmp_path, capsys):
     out = tmp_path / "new" / "demo.npz"
+    out.parent.mkdir()
+    for name in ("demo.mp4", "demo.html"):
+        (out.parent / name).write_text("a person's own")
     model = ["--hand-model", str(hands)]
     cli.main(["retarget", str(video), "--midi", str(midi), "-o", str(out), *model])
     assert "pianomime play" in capsys.readouterr().out
+    for name in ("demo.mp4", "demo.html"):
+        assert (out.parent / name).read_text() == "a person's own"
     assert Demonstration.load(out).source == video.name
-    overlay = Film(out.with_suffix(".mp4"))
+    assert Demonstration.load(out).quality["notes_from"] == midi.name
+    overlay = Film(tmp_path / "new" / "demo-seen.mp4")
     assert (overlay.width, overlay.height) == SIZE
-    assert "Where tracking was poor" in out.with_suffix(".html").read_text("utf-8")
+    assert "Where tracking was poor" in (tmp_path / "new" / "demo-seen.html").read_text("utf-8")
     cli.main(["play", str(out), "--no-video", "--seconds", "1", "-o", str(tmp_path / "played")])
     assert (tmp_path / "played" / "report.json").exists()
 

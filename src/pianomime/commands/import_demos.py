@@ -37,14 +37,14 @@ class ImportDemos:
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.progress import bars
+        from pianomime.report import staged
         from pianomime.video.published import read_published
 
         out = self.out or Path("out", f"demos-{self.source.stem}")
         number = 0
-        with bars() as tell:
+        with staged(out, ()) as folder, bars() as tell:
             for demonstration, total in read_published(self.source, self.clips):
-                out.mkdir(parents=True, exist_ok=True)
-                demonstration.save(out / f"{demonstration.score.title}.npz")
+                demonstration.save(folder / f"{demonstration.score.title}.npz")
                 number += 1
                 tell("importing", number, total)
         print(f"saved {number} demonstrations: {out}")

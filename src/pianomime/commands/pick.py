@@ -34,17 +34,20 @@ class Pick:
         """Serve the page until the points are saved.
 
         Raises:
-            InputError: not a video.
+            InputError: not a video, or OUT or the port is not what it should be.
             OSError: a file cannot be read or written.
         """
         import webbrowser
 
+        from pianomime.errors import InputError
         from pianomime.video.film import Film
         from pianomime.video.pick_page import PickPage
 
         out = self.out or Path("out", self.video.stem + "-points.json")
-        out.parent.mkdir(parents=True, exist_ok=True)
+        if out.suffix != ".json":
+            raise InputError(f"{out}: points are a file that ends in .json")
         with PickPage(Film(self.video), out, self.port) as page:
+            out.parent.mkdir(parents=True, exist_ok=True)
             print(f"click the points here: {page.url} (Ctrl-C to give up)", flush=True)
             if self.browser:
                 webbrowser.open(page.url)

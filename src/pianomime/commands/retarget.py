@@ -8,13 +8,17 @@ from typing import Annotated, Literal
 
 import tyro
 
+_REMARKS = 10
+"""That are printed; hours of video make hundreds."""
+
 
 @dataclass(frozen=True)
 class Retarget:
     """Make a demonstration of a video of somebody playing, seen from above.
 
-    OUT can then be played: `pianomime play OUT`. Beside it lie a page that shows how well hands
-    and keys were seen (OUT with .html) and the video with what was seen drawn into it (.mp4).
+    DEMO.npz can then be played: `pianomime play DEMO.npz`. Beside it lie a page that shows how
+    well hands and keys were seen (DEMO-seen.html) and the video with what was seen drawn into it
+    (DEMO-seen.mp4).
 
     Examples:
       pianomime retarget VIDEO.mp4 --midi SONG.mid
@@ -58,24 +62,27 @@ class Retarget:
             raise InputError(f"{out}: a demonstration is a file that ends in .npz")
         if out.exists() and out.is_dir():
             raise InputError(f"{out}: is a folder; a file is needed")
-        overlay, page = out.with_suffix(".mp4"), out.with_suffix(".html")
+        # Names that nobody else gives: an earlier one of ours is replaced, or removed.
+        overlay, page = (out.with_name(f"{out.stem}-seen{end}") for end in (".mp4", ".html"))
         ours = {file.name for file in (out, overlay, page)}
         if self.video.resolve() in (overlay.resolve(), page.resolve(), out.resolve()):
             raise InputError(f"{self.video}: would be overwritten; give OUT another name")
         config = RetargetConfig(self.midi, self.points, self.offset, self.hand_model, self.align)
-        with bars() as tell:
+        # The folder first: that it cannot be written shows before the work, not after. Whoever
+        # interrupts this finds no picture of a demonstration that is not there.
+        with staged(out.parent, ours) as folder, bars() as tell:
             made = retarget(self.video, config, tell)
-            # Whoever interrupts this finds no picture of a demonstration that is not there.
-            with staged(out.parent, ours) as folder:
-                if self.overlay:
-                    write_overlay(made, folder / overlay.name, tell)
-                write_summary(made, folder / page.name)
-                made.demonstration.save(folder / out.name)
+            if self.overlay:
+                write_overlay(made, folder / overlay.name, tell)
+            write_summary(made, folder / page.name)
+            made.demonstration.save(folder / out.name)
         quality = made.demonstration.quality
         print(f"keyboard: {quality['keyboard']}")
         print(f"both hands seen in {quality['both_hands_found']:.1%} of the frames")
         print(f"notes: {quality['notes']}, fingers guessed: {quality['notes_guessed']}")
-        for remark in made.remarks:
+        for remark in made.remarks[:_REMARKS]:
             print(f"note: {remark}")
+        if len(made.remarks) > _REMARKS:
+            print(f"note: {len(made.remarks) - _REMARKS} more such notes are in the page")
         print(f"look: {page}")
         print(f"play it: pianomime play {out}")

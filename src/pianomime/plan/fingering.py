@@ -23,7 +23,8 @@ from pianomime.plan.hand_cost import (
 )
 from pianomime.world.figures import KEYS
 
-# Notes of one onset that may be left out, by how many there are; or all of them.
+# Notes of one onset that may be left out, by how many there are; or all of them but two or one,
+# or all. Of six or fewer, any.
 _MOST_DROPPED = {7: 4, 8: 4, 9: 3, 10: 3}
 
 
@@ -50,7 +51,8 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     """Search the cheapest fingering, onset by onset, keeping the best partial ones.
 
     A note is left out where no finger can reach it, or where playing it costs other notes more
-    than it is worth. Of more than ten notes struck at once the inner ones are left out.
+    than it is worth. Of more than ten notes struck at once the inner ones are left out; where
+    more than four of seven or eight, or three of nine or ten, are out of reach, all but two.
     """
     config = config or FingeringConfig()
     frames = score.note_frames()
@@ -82,18 +84,20 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     row = int(np.argmin(beam.cost))
     chain = []
     for onset, group, place, choice in reversed(history):
-        chain.append((onset, group, place, choice.of(row)))
+        chain.append((int(onset), group, place, *(array[row] for array in choice[1:])))
         row = int(choice.parent[row])
     sounding = np.full((2, FINGERS), -1)
-    for onset, group, place, (assignment, let_go, early, late) in reversed(chain):
+    for onset, group, place, let_go, assignment, early, late in reversed(chain):
         mine = np.where(place >= 0, assignment[place], -1)
         played = group[mine >= 0]
         hand, finger = np.divmod(mine[mine >= 0], FINGERS)
         fingering.hand[played], fingering.finger[played] = hand, finger
-        fingering.start[played] = np.minimum(onset + late[hand], fingering.stop[played])
-        leave = np.where(let_go & (sounding >= 0), onset - early[:, None], np.inf)
-        gone = np.isfinite(leave)
-        fingering.stop[sounding[gone]] = np.minimum(fingering.stop[sounding[gone]], leave[gone])
+        fingering.start[played] = np.minimum(
+            onset + late[hand].astype(np.int64), fingering.stop[played]
+        )
+        side, gone = np.nonzero(let_go & (sounding >= 0))
+        cut = sounding[side, gone]
+        fingering.stop[cut] = np.minimum(fingering.stop[cut], onset - early[side].astype(np.int64))
         sounding[hand, finger] = played
     return fingering
 
@@ -110,16 +114,11 @@ def frame_worth(score: Score) -> NDArray[np.float64]:
 class _Choice(NamedTuple):
     """How each of B rows of a beam came from the one before."""
 
-    parent: NDArray[np.int64]  # (B,) the row it came from
-    assignment: NDArray[np.int8]  # (B, M) 0..4 left thumb to little, 5..9 right, -1 not played
+    parent: NDArray[np.int32]  # (B,) the row it came from
     let_go: NDArray[np.bool_]  # (B, 2, 5) fingers that have let go before the hand strikes
-    early: NDArray[np.int64]  # (B, 2) frames before the onset in which they have, at the latest
-    late: NDArray[np.int64]  # (B, 2) frames after the onset in which the hand strikes
-
-    def of(
-        self, row: int
-    ) -> tuple[NDArray[np.int8], NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
-        return self.assignment[row], self.let_go[row], self.early[row], self.late[row]
+    assignment: NDArray[np.int8]  # (B, M) 0..4 left thumb to little, 5..9 right, -1 not played
+    early: NDArray[np.int8]  # (B, 2) frames before the onset in which they have, at the latest
+    late: NDArray[np.int8]  # (B, 2) frames after the onset in which the hand strikes
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,15 +169,18 @@ class _Beam:
             ]
             return np.stack(each, axis=1)
 
-        choice = _Choice(parent, assigned[pair], both("let_go"), both("early"), both("late"))
+        assignment, let_go = assigned[pair], both("let_go")
+        early, late = both("early"), both("late")
         key, since, until = self.key[parent], self.since[parent], self.until[parent]
-        left_by = struck.onset - choice.early[..., None]
-        until = np.where(choice.let_go, np.minimum(until, left_by), until)
-        row, note = np.nonzero(choice.assignment >= 0)
-        hand, finger = np.divmod(choice.assignment[row, note], FINGERS)
+        until = np.where(let_go, np.minimum(until, struck.onset - early[..., None]), until)
+        row, note = np.nonzero(assignment >= 0)
+        hand, finger = np.divmod(assignment[row, note], FINGERS)
         key[row, hand, finger] = struck.keys[note]
-        since[row, hand, finger] = struck.onset + choice.late[row, hand]
+        since[row, hand, finger] = struck.onset + late[row, hand]
         until[row, hand, finger] = struck.ends[note]
+        # Every one is kept to the end: small, for hours of music.
+        small = (array.astype(np.int8) for array in (assignment, early, late))
+        choice = _Choice(parent.astype(np.int32), let_go, *small)
         return _Beam(total[parent, pair], key, since, until, both("centre")), choice
 
 
@@ -219,7 +221,7 @@ def _options(notes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     # Ten fingers from bass to treble: left little .. left thumb, right thumb .. right little.
     left = [4, 3, 2, 1, 0]
     fewest = max(0, notes - _MOST_DROPPED.get(notes, notes))
-    for played in sorted({0, *range(fewest, notes + 1)}):
+    for played in sorted({*range(min(notes, 2) + 1), *range(fewest, notes + 1)}):
         for which in combinations(range(notes), played):
             for places in combinations(range(2 * FINGERS), played):
                 mine = np.full((2, notes), -1)

@@ -19,8 +19,10 @@ from pianomime.plan.reach import EASE, stretch
 from pianomime.world.figures import BLACK, CONTROL_DT, KEYS, key_centres
 
 FINGERS = 5
+# [m] A finger that goes to another key, up and down again.
+_LIFT = 0.01
 EARLY, LATE = 4, 5
-"""A hand may leave fewer than this many frames early, and arrive fewer than that late."""
+"""Choices of how many frames a hand leaves early (0 to 3), and arrives late (0 to 4)."""
 
 
 @dataclass(frozen=True)
@@ -159,10 +161,10 @@ def hand_cost(
     cost += travel
 
     # A finger that goes to another key, on top of what the hand carries it.
-    idle = struck.onset - np.minimum(fingers.until, struck.onset)[:, None] + late[..., None]
-    idle = np.maximum(idle, early[..., None]) + 1
+    idle = struck.onset - np.minimum(fingers.until, struck.onset)[:, None]
+    idle = np.maximum(idle, early[..., None]) + late[..., None] + 1
     hops = strike & (fingers.key[:, None] >= 0) & (strikes != fingers.key[:, None])
-    way = np.abs(at - along[fingers.key][:, None] - (centre - before)[..., None]) + 0.01
+    way = np.abs(at - along[fingers.key][:, None] - (centre - before)[..., None]) + _LIFT
     hop = (way / (idle * CONTROL_DT * config.hop_speed)) ** 2 + config.reuse / idle**2
     cost += struck.unit * np.where(hops, hop, 0.0).sum(axis=2)
 
@@ -223,7 +225,12 @@ def _travel_cost(
     lost = taken.sum(axis=2)[:, :, None] + released * struck.lost(np.maximum(leave, 0), onset)
     newest = np.where(release, fingers.since[:, None], -1).max(axis=2)
     lost[(released > 0) & (newest >= leave)] = np.inf
+    # What the hand holds on to may itself have come late: it neither leaves before that,
+    newest_kept = np.where(held[:, None] & ~release, fingers.since[:, None], -1).max(axis=2)
+    lost[(early > 0) & (newest_kept >= leave)] = np.inf
     total += lost[:, None]
+    # nor strikes anything else.
+    total += np.where(onset + late[:, None, None] < newest_kept, np.inf, 0.0)
 
     # Arriving late, from all that it strikes.
     ends = np.full(KEYS + 1, onset + LATE)

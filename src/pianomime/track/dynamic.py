@@ -115,7 +115,8 @@ class DynamicTracker:
             here = qpos[hand.joints]
             points[index], jacobian = hand.points_and_jacobian(here)
             tips, jacobian = points[index, 1:], jacobian[1:]
-            # A finger corrects itself: moving wrist or forearm would move all the others.
+            # A finger corrects itself, and only what pressing fingers have in common is left to
+            # the forearm: moving it moves all of them.
             jacobian[..., :_ARM_JOINTS] = 0.0
             keys = self._finger_key[frame, index]
             error = self._tips[index][frame] - tips
@@ -124,7 +125,8 @@ class DynamicTracker:
             lift = np.where(keys >= 0, beside, low)
             move = self.config.joint_feedback * (self._paths[index][frame] - here)
             move += self._reach(jacobian, error)
-            move[_SLIDE] += _shared(error[keys >= 0, 1])
+            limit = self.config.tip_error
+            move[_SLIDE] += _shared(np.clip(error[keys >= 0, 1], -limit, limit))
             move += self._lift(jacobian[lift, 2])
             press = self._press[index][frame][~lift].sum(axis=0)
             ctrl[hand.actuators] += hand.to_ctrl @ move + press

@@ -29,8 +29,9 @@ class RolloutConfig:
 
     variations: int = 16
     """Variations that are rolled out side by side."""
-    rounds: int = 1
-    """Times that variations of the best so far are drawn."""
+    rounds: int = 2
+    """Times that variations of the best so far are drawn: more of these gain more than more
+    variations in each."""
     commit: int = 4
     """Frames that are played before looking ahead again."""
     ahead: int = 8
@@ -57,8 +58,8 @@ class RolloutConfig:
         """The settings of efforts 1 to 3: each tries several times as much as the one before."""
         return {
             1: cls(),
-            2: cls(variations=32, rounds=2, ahead=10),
-            3: cls(variations=64, rounds=5, ahead=10),
+            2: cls(rounds=6),
+            3: cls(variations=32, rounds=12),
         }[effort]
 
 

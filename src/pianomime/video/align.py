@@ -44,21 +44,16 @@ def align(
         return _as_in_the_paper(score, points)
     finger_key = np.full((len(points), 2, 5), NO_KEY, np.int8)
     for note, (first, _) in enumerate(score.note_frames()):
-        if fingers.hand[note] >= 0:
-            finger_key[first : fingers.stop[note], fingers.hand[note], fingers.finger[note]] = (
-                score.key[note]
-            )
-    tips = points[:, :, 1:]
-    moved = tips.copy()
+        finger_key[first : fingers.stop[note], fingers.hand[note], fingers.finger[note]] = (
+            score.key[note]
+        )
+    moved = _raised(points)
     for hand in range(2):
         for finger in range(5):
-            moved[:, hand, finger] += _shift(tips[:, hand, finger], finger_key[:, hand, finger])
-    return FingertipPlan(
-        _with_height(np.concatenate((points[:, :, :1], moved), axis=2), finger_key),
-        finger_key,
-        fingers.hand,
-        fingers.finger,
-    )
+            keys, tip = finger_key[:, hand, finger], moved[:, hand, finger + 1]
+            tip[:, :2] += _shift(tip[:, :2], keys)
+            tip[keys != NO_KEY, 2] = 0.0
+    return FingertipPlan(moved, finger_key, fingers.hand, fingers.finger)
 
 
 def _shift(tip: NDArray[np.float64], keys: NDArray[np.int8]) -> NDArray[np.float64]:
@@ -102,7 +97,7 @@ def _as_in_the_paper(score: Score, points: NDArray[np.float64]) -> FingertipPlan
     it, is moved to its middle line; if there is none, nothing is done.
     """
     centres, half = key_centres(), key_half_sizes()
-    moved = points.copy()
+    moved = _raised(points)
     finger_key = np.full((len(points), 2, 5), NO_KEY, np.int8)
     roll = score.roll()
     for frame, key in zip(*np.nonzero(roll), strict=True):
@@ -118,18 +113,18 @@ def _as_in_the_paper(score: Score, points: NDArray[np.float64]) -> FingertipPlan
             continue
         hand, finger = np.unravel_index(np.argmin(np.where(wanted, beside, np.inf)), beside.shape)
         finger_key[frame, hand, finger] = key
-        moved[frame, hand, finger + 1, 1] = centres[key, 1]
+        moved[frame, hand, finger + 1, 1:] = centres[key, 1], 0.0
     note_hand = np.full(len(score), -1, np.int8)
     note_finger = note_hand.copy()
     for note, (first, end) in enumerate(score.note_frames()):
         often = (finger_key[first:end] == score.key[note]).sum(axis=0)
         if often.any():
             note_hand[note], note_finger[note] = np.unravel_index(often.argmax(), often.shape)
-    return FingertipPlan(_with_height(moved, finger_key), finger_key, note_hand, note_finger)
+    return FingertipPlan(moved, finger_key, note_hand, note_finger)
 
 
-def _with_height(points: NDArray[np.float64], finger_key: NDArray[np.int8]) -> NDArray[np.float64]:
-    """Points (T, 2, 6, 2) with z: 0 where a finger presses, `HIGH` elsewhere."""
-    height = np.full(points.shape[:3], HIGH)
-    height[:, :, 1:][finger_key != NO_KEY] = 0.0
-    return np.concatenate((points, height[..., None]), axis=3)
+def _raised(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, 2, 6, 3) points that press nothing: at `HIGH`."""
+    raised = np.full((*points.shape[:3], 3), HIGH)
+    raised[..., :2] = points
+    return raised

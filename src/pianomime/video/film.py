@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
 import warnings
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -59,8 +58,7 @@ class Film:
         self.path = Path(path)
         if self.path.is_dir():
             raise InputError(f"{self.path}: is a folder, not a video")
-        with self._open() as container:
-            stream = container.streams.video[0]
+        with self._open() as (container, stream):
             first = next(self._decode(container, stream), None)
             if first is None:
                 raise InputError(f"{self.path}: no picture in it can be read")
@@ -90,8 +88,7 @@ class Film:
     def _frames(self, rate: float, due: int) -> Iterator[Frame]:
         before: tuple[float, Any] | None = None
         last: Frame | None = None
-        with self._open() as container:
-            stream = container.streams.video[0]
+        with self._open() as (container, stream):
             stream.thread_type = "AUTO"
             # Without times in the file only counting from its beginning tells which frame it is.
             if due and self._timed:
@@ -114,20 +111,41 @@ class Film:
                     due += 1
 
     def sample(self, count: int) -> list[NDArray[np.uint8]]:
-        """Pictures from all over the video, without decoding all of it."""
+        """Pictures from all over the video.
+
+        Not all of it is decoded, unless it does not say how long it is, or nothing in it can be
+        jumped to: then half as many pictures may be given.
+        """
+        return (self._jump(count) if self.seconds else []) or self._pass(count)
+
+    def _pass(self, count: int) -> list[NDArray[np.uint8]]:
+        """Every n-th picture, n doubled whenever there are too many."""
+        pictures: list[NDArray[np.uint8]] = []
+        step = 1
+        with self._open() as (container, stream):
+            stream.thread_type = "AUTO"
+            for number, frame in enumerate(self._decode(container, stream)):
+                if number % step:
+                    continue
+                if len(pictures) == count:
+                    pictures = pictures[::2]
+                    step *= 2
+                    if number % step:
+                        continue
+                pictures.append(self._picture(0.0, frame, None).picture)
+        return pictures
+
+    def _jump(self, count: int) -> list[NDArray[np.uint8]]:
         pictures = []
         visits: dict[float, int] = {}
-        with self._open() as container:
-            stream = container.streams.video[0]
+        with self._open() as (container, stream):
             stream.thread_type = "AUTO"
             for number in range(count):
-                goal = math.inf
-                if self.seconds:
-                    goal = self._start + self.seconds * (number + 0.5) / count
-                    try:
-                        container.seek(int(goal / stream.time_base), stream=stream)
-                    except av.error.FFmpegError:
-                        continue
+                goal = self._start + self.seconds * (number + 0.5) / count
+                try:
+                    container.seek(int(goal / stream.time_base), stream=stream)
+                except av.error.FFmpegError:
+                    continue
                 # Only key frames can be reached at once; where several goals lead to the same
                 # one, go on a little farther each time.
                 skip = -1
@@ -150,23 +168,25 @@ class Film:
         picture = frame.reformat(*self._working, "rgb24", interpolation=_SHRINKING).to_ndarray()
         return Frame(seconds, np.ascontiguousarray(np.rot90(picture, self._turns)))
 
-    def _open(self) -> Any:
+    @contextmanager
+    def _open(self) -> Iterator[tuple[Any, Any]]:
+        """The file, and the stream in it that is the video."""
         try:
             container = av.open(str(self.path))
         except FileNotFoundError:
             raise InputError(f"{self.path}: does not exist") from None
         except (av.error.FFmpegError, OSError) as error:
             raise InputError(f"{self.path}: not a video") from error
-        pictures = [
-            stream
-            for stream in container.streams.video
-            # The cover of a recording is a stream of one picture.
-            if not (getattr(stream, "disposition", 0) & av.stream.Disposition.attached_pic)
-        ]
-        if not pictures:
-            container.close()
-            raise InputError(f"{self.path}: has no pictures; a video of a keyboard is needed")
-        return container
+        with container:
+            pictures = [
+                stream
+                for stream in container.streams.video
+                # The cover of a recording is a stream of one picture.
+                if not (getattr(stream, "disposition", 0) & av.stream.Disposition.attached_pic)
+            ]
+            if not pictures:
+                raise InputError(f"{self.path}: has no pictures; a video of a keyboard is needed")
+            yield container, pictures[0]
 
     def _decode(self, container: Any, stream: Any) -> Iterator[Any]:
         try:

@@ -104,7 +104,7 @@ def _mediapipe() -> tuple[Any, Any]:
         return mediapipe, importlib.import_module("mediapipe.tasks.python.vision")
     except ImportError as error:
         raise InputError(
-            f"MediaPipe is needed to see hands: pip install 'pianomime[video]' ({error})"
+            f"MediaPipe is needed to see hands: pip install -e '.[video]' ({error})"
         ) from error
     except OSError as error:
         raise InputError(_advice(error)) from error

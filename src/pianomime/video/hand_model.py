@@ -6,6 +6,7 @@ import hashlib
 import os
 import urllib.error
 import urllib.request
+from http.client import HTTPException
 from pathlib import Path
 
 from pianomime.errors import InputError
@@ -41,7 +42,7 @@ def find_hand_model(given: Path | None = None, url: str = URL) -> Path:
     try:
         with urllib.request.urlopen(url, timeout=_SECONDS) as answer:
             content: bytes = answer.read()
-    except (urllib.error.URLError, OSError, ValueError) as error:
+    except (urllib.error.URLError, HTTPException, OSError, ValueError) as error:
         raise InputError(
             f"MediaPipe's hand model cannot be downloaded ({error}); get {url} on another machine "
             f"and name the file with --hand-model, or put it at {cached}"

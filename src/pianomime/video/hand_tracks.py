@@ -15,6 +15,7 @@ from scipy.signal import savgol_filter
 from pianomime.plan import LEFT, RIGHT
 from pianomime.video.plane import Plane
 from pianomime.video.sightings import Sighting, Sightings
+from pianomime.video.strays import strays
 from pianomime.video.stretches import stretches
 
 _SAME_HAND = 0.05
@@ -31,6 +32,8 @@ _STRAY = 0.025
 """[m] A point this far from where its neighbours in time have it was seen wrongly."""
 _SMOOTH = 5
 """Frames that are smoothed together, with a parabola, which has no lag."""
+FEWEST = 0.05
+"""Share of the frames in which a hand must be seen to be one: less are ghosts."""
 _AT_EASE = np.array(
     [[0.19, 0.0], [0.055, 0.1], [0.0, 0.03], [-0.005, 0.0], [0.0, -0.025], [0.01, -0.05]]
 )
@@ -43,7 +46,8 @@ class HandTracks:
 
     Attributes:
         points: (T, 2, 6, 2) world x, y [m]; hands (left, right); points as in `plan.POINTS`.
-        found: (T, 2) bool, hands that were seen in a frame; the others are filled in.
+        found: (T, 2) bool, hands that were seen in a frame; the others are filled in. A hand that
+            is hardly ever seen (`FEWEST`) is taken for a ghost: it is never found, and made up.
         mended: (T, 2, 6) bool, points that were seen but wrongly, and filled in.
         ghosts: number of sightings that were taken for no hand.
         swaps: number of frames in which MediaPipe took left for right.
@@ -58,6 +62,16 @@ class HandTracks:
     def __len__(self) -> int:
         """Number of frames."""
         return len(self.points)
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(2,) hands that are there; the others are made up and play nothing."""
+        return np.asarray(self.found.any(axis=0))
+
+    def seen_points(self, step: int = 1) -> NDArray[np.float64]:
+        """(ceil(T / step), H, 6, 2) of the H hands that are there, in every step-th frame."""
+        points = self.points[::step]
+        return points if self.seen.all() else points[:, self.seen]
 
 
 def follow(
@@ -91,6 +105,10 @@ def follow(
         swaps += swapped
         ghosts += len(hands) - sum(which >= 0 for which in pick)
     found = np.isfinite(points).all(axis=(2, 3))
+    for hand in (LEFT, RIGHT):
+        if found[:, hand].mean() < FEWEST:
+            ghosts += int(found[:, hand].sum())
+            points[:, hand], found[:, hand] = np.nan, False
     mended = np.zeros(points.shape[:3], bool)
     for hand in (LEFT, RIGHT):
         points[:, hand], mended[:, hand] = _repair(points[:, hand], hand)
@@ -219,25 +237,25 @@ def _repair(
     frames = len(points)
     stray = np.zeros((frames, 6), bool)
     if not np.isfinite(points).any():
-        side = -1 if hand == LEFT else 1
-        place = _AT_EASE * [1, 1 if hand == LEFT else -1] + [0.0, 0.2 * side]
-        return np.broadcast_to(place, points.shape).copy(), stray
-    if frames >= 3:
-        between = (points[:-2] + points[2:]) / 2
-        off = np.linalg.norm(points[1:-1] - between, axis=2)
-        still = np.linalg.norm(points[2:] - points[:-2], axis=2)
-        # A quick move is not a stray: there, before and after are apart.
-        stray[1:-1] = off > _STRAY + still
-    filled = points.copy()
-    filled[stray] = np.nan
+        return np.broadcast_to(at_rest(hand), points.shape).copy(), stray
+    filled = np.empty_like(points)
     time = np.arange(frames)
+    # Point by point: hours of all of them at once take much memory.
     for point in range(6):
+        stray[:, point] = strays(points[:, point], _STRAY)
+        known = np.isfinite(points[:, point]).all(axis=1) & ~stray[:, point]
         for axis in range(2):
-            known = np.isfinite(filled[:, point, axis])
-            filled[:, point, axis] = np.interp(time, time[known], filled[known, point, axis])
-    if frames >= _SMOOTH:
-        filled = savgol_filter(filled, _SMOOTH, 2, axis=0, mode="interp")
+            course = np.interp(time, time[known], points[known, point, axis])
+            if frames >= _SMOOTH:
+                course = savgol_filter(course, _SMOOTH, 2, mode="interp")
+            filled[:, point, axis] = course
     return filled, stray
+
+
+def at_rest(hand: int) -> NDArray[np.float64]:
+    """(6, 2) world x, y [m] of a hand that was never seen."""
+    side = -1 if hand == LEFT else 1
+    return _AT_EASE * [1, -side] + [0.0, 0.2 * side]
 
 
 def poorly_seen(tracks: HandTracks) -> list[tuple[float, float, int]]:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.video.hand_tracks import HandTracks
 from pianomime.video.plane import Plane
+from pianomime.video.touch import touching
 from pianomime.world.figures import BLACK, KEYS, key_centres
 
 ZONES = {
@@ -24,6 +26,10 @@ that go down change their shade, and hands come and go."""
 
 _SOME = 2000
 """Frames."""
+_FEWEST = 20
+"""Frames without a finger near a key that tell what it looks like at rest."""
+_NEAR = 0.05
+"""`touching` from which a finger is near a key: at about 15 mm from its middle."""
 _HALF_WIDTH = np.where(BLACK, 0.004, 0.006)
 
 
@@ -48,25 +54,44 @@ class KeyLight:
         return np.where(self._inside[..., None], patches, 0).astype(np.uint8)
 
 
+def unattended(tracks: HandTracks) -> NDArray[np.bool_]:
+    """(S, 88) whether no finger is near a key, in the frames that tell what is usual."""
+    points = tracks.seen_points(_step(len(tracks)))
+    return np.stack([touching(points, key) < _NEAR for key in range(KEYS)], axis=1)
+
+
+def _step(frames: int) -> int:
+    """Of so many frames every how manieth tells what is usual."""
+    return max(1, frames // _SOME)
+
+
 class Glow:
     """How much the keys stand out from their usual look in one zone, a key at a time.
 
     A key at a time, because of hours of video all keys at once would fill the memory.
     """
 
-    def __init__(self, light: NDArray[np.uint8], zone: int, colourful: bool) -> None:
+    def __init__(
+        self, light: NDArray[np.uint8], away: NDArray[np.bool_], zone: int, colourful: bool
+    ) -> None:
         """Find out what is usual.
 
         Args:
             light: (T, zones, 88, 3), what `KeyLight.read` gives for each frame.
+            away: what `unattended` tells of the same frames.
             zone: which of `ZONES`.
             colourful: go by how colourful a patch is, rather than by any change of colour.
         """
         self._light = light[:, zone]
         self._colourful = colourful
         # Some frames will do to know what is usual, and what is strong.
-        some = self._light[:: max(1, len(light) // _SOME)]
+        some = self._light[:: _step(len(light))]
         self._usual = np.asarray(np.median(some, axis=0), np.float32)
+        # A key may be down for most of the film: at rest it is when no finger is near it.
+        for key in range(KEYS):
+            rest = some[away[:, key], key]
+            if len(rest) >= _FEWEST:
+                self._usual[key] = np.median(rest, axis=0)
         self._strong = max(float(np.percentile(self._change(some, self._usual), 99.5)), 5.0)
 
     def of(self, key: int) -> NDArray[np.float32]:

@@ -13,7 +13,7 @@ from scipy.signal import fftconvolve
 
 from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
-from pianomime.video.key_light import LIT, Glow
+from pianomime.video.key_light import LIT, Glow, unattended
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -54,14 +54,14 @@ def estimate_offset(
         light: (T, zones, 88, 3), see `KeyLight`.
         given: the offset, if it is known: then only how well it fits is found out.
     """
-    points = tracks.points
+    points, away = tracks.seen_points(), unattended(tracks)
     touched, counts, lags = _correlate(
         lambda key: touching(points, key) > np.exp(-1.0), len(points), score
     )
     evidence, _, _ = _correlate(lambda key: touching(points, key), len(points), score)
     best_light, best_peak = np.zeros(len(lags)), 0.0
     for zone, colourful in product(LIT, (True, False)):
-        rise = partial(_rise, Glow(light, zone, colourful))
+        rise = partial(_rise, Glow(light, away, zone, colourful))
         found, _, _ = _correlate(rise, len(points), score)
         peak = float(found.max() - np.median(found))
         if peak > best_peak:

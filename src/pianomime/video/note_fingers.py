@@ -16,6 +16,8 @@ _BEAM = 60
 """Partial fingerings that are kept."""
 _WORST = 20.0
 """Misfit beyond which a finger is simply elsewhere."""
+_NOBODY = 25.0
+"""The same of a hand that was never seen: a little better than a hand that is seen elsewhere."""
 _STRIKE = 3
 """Frames from the onset in which a finger must be on its key."""
 _HOLD = 0.3
@@ -54,16 +56,22 @@ class NoteFingers:
         return self.misfit > _ELSEWHERE
 
 
-def find_note_fingers(score: Score, points: NDArray[np.float64]) -> NoteFingers:
+def find_note_fingers(
+    score: Score, points: NDArray[np.float64], seen: NDArray[np.bool_]
+) -> NoteFingers:
     """The cheapest fingering: fingers near their keys, each on one key at a time, in order.
+
+    A hand that was never seen gets, as a guess, those notes that no finger is anywhere near.
 
     Args:
         score: its times are those of the video.
         points: (T, 2, 6, 2) as in `HandTracks`; T reaches to the end of the score.
+        seen: (2,) hands that were seen.
     """
     frames = score.note_frames()
     order = np.lexsort((score.key, frames[:, 0]))
     fit = _fits(score, points, frames)
+    fit[:, np.repeat(~seen, 5)] = _NOBODY
     cost = np.zeros(1)
     until = np.zeros((1, _FINGERS), np.int64)
     since = np.full((1, _FINGERS), -1)
@@ -122,6 +130,8 @@ def _fits(
     tips = points[:, :, 1:].reshape(len(points), _FINGERS, 2)
     fit = np.empty((len(score), _FINGERS))
     for note, (first, end) in enumerate(frames.tolist()):
+        # A key that is struck again at the very end sounds only after the last frame.
+        first = min(first, len(tips) - 1)
         during = tips[first : max(end, first + 1)]
         off = np.minimum(misfit(during, score.key[note, None]), _WORST)
         fit[note] = off[:_STRIKE].mean(axis=0) + _HOLD * off.mean(axis=0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
-from pianomime.video.key_light import LIT, ZONES, Glow
+from pianomime.video.key_light import LIT, ZONES, Glow, unattended
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -52,10 +52,11 @@ def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> Read
         tracks: the hands.
         title: of the score.
     """
-    near = np.stack([touching(tracks.points, key) > _TOUCHED for key in range(KEYS)], axis=1)
+    points, away = tracks.seen_points(), unattended(tracks)
+    near = np.stack([touching(points, key) > _TOUCHED for key in range(KEYS)], axis=1)
     best: tuple[float, NDArray[np.int64], bool] = (0.0, np.zeros((0, 3), np.int64), True)
     for zone, colourful, share in product(range(len(ZONES)), (True, False), _SHARES):
-        glow = Glow(light, zone, colourful)
+        glow = Glow(light, away, zone, colourful)
         for notes in _runs(glow, share):
             worth = _worth(notes, near)
             if zone not in LIT:

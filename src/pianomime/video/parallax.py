@@ -44,7 +44,7 @@ def without_parallax(points: NDArray[np.float64], score: Score, fingers: NoteFin
         score: its times are those of the points.
         fingers: who seems to have played each note.
     """
-    sure = np.flatnonzero((fingers.hand >= 0) & ~fingers.guessed)
+    sure = np.flatnonzero(~fingers.guessed)
     if len(sure) < _FEWEST:
         return Straight(points, 0.0)
     frame = np.minimum(score.note_frames()[sure, 0] + 1, len(points) - 1)

@@ -16,11 +16,14 @@ from PIL import Image
 from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.video.film import Film
-from pianomime.video.points import SUGGESTED, read_points
+from pianomime.video.points import SUGGESTED, parse_points
 
 _FRAMES = 15
+_LAST_PORT = 65535
 _LONGEST = 100_000
 """Bytes of an answer."""
+_PATIENCE = 2.0
+"""[s] for which a browser that has connected may say nothing: others wait so long."""
 
 _PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Where is the keyboard?</title><style>
@@ -87,9 +90,18 @@ class PickPage:
             film: the video.
             out: JSON file to write, see `pianomime.video.points`.
             port: 0 for any free one.
+
+        Raises:
+            InputError: no such port, or no picture in the video can be read.
+            OSError: the port is taken.
         """
+        if not 0 <= port <= _LAST_PORT:
+            raise InputError(f"a port is a number from 0 to {_LAST_PORT}, not {port}")
+        pictures = film.sample(_FRAMES)
+        if not pictures:
+            raise InputError(f"{film.path}: no picture in it can be read")
         # The middle of all, so that hands hide less.
-        picture = np.median(np.stack(film.sample(_FRAMES)), axis=0).astype(np.uint8)
+        picture = np.median(np.stack(pictures), axis=0).astype(np.uint8)
         file = io.BytesIO()
         Image.fromarray(picture).save(file, "png")
         page = _PAGE.substitute(names=json.dumps(SUGGESTED), width=film.width, height=film.height)
@@ -98,6 +110,8 @@ class PickPage:
         owner = self
 
         class Handler(BaseHTTPRequestHandler):
+            timeout = _PATIENCE
+
             def do_GET(self) -> None:
                 if self.path in contents:
                     self._answer(200, *contents[self.path])
@@ -154,10 +168,10 @@ class PickPage:
 
 def _save(answer: bytes, out: Path) -> str:
     try:
-        content = json.loads(answer)
+        text = json.dumps(json.loads(answer), indent=2) + "\n"
     except ValueError as error:
         raise InputError("the points did not arrive as JSON") from error
+    told = parse_points(text, out).describe()
     with atomic(out) as temporary:
-        temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-        # Looked at before it is put in place.
-        return read_points(temporary).describe()
+        temporary.write_text(text, encoding="utf-8")
+    return told

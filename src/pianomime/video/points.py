@@ -88,13 +88,30 @@ def read_points(path: Path) -> NamedPoints:
         InputError: no such file, or one that does not hold four points or more, well apart.
     """
     try:
-        content = json.loads(path.read_text("utf-8"))
+        text = path.read_text("utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: does not exist") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read") from error
+    return parse_points(text, path)
+
+
+def parse_points(text: str, path: Path) -> NamedPoints:
+    """The same of the text of a file.
+
+    Args:
+        text: JSON.
+        path: of the file, for messages.
+
+    Raises:
+        InputError: it does not hold four points or more, well apart.
+    """
+    try:
+        content = json.loads(text)
         given = content["points"]
         names = list(given)
         pixels = np.array([given[name] for name in names], np.float64).reshape(-1, 2)
-    except FileNotFoundError:
-        raise InputError(f"{path}: does not exist") from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f'{path}: must hold {{"points": {{NAME: [COLUMN, ROW], ...}}}}') from error
     if len(names) < 4 or not np.isfinite(pixels).all():
         raise InputError(f"{path}: 4 points at least are needed, of numbers")

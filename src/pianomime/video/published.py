@@ -8,7 +8,6 @@ found, fingers that press keys nobody asked for, and jumps of single frames.
 from __future__ import annotations
 
 import importlib
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,11 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.archive import read_arrays
 from pianomime.errors import InputError
 from pianomime.music import KEYS, Score
 from pianomime.plan import NO_KEY, FingertipPlan
 from pianomime.video.align import HIGH
 from pianomime.video.demonstration import Demonstration, on_grid
+from pianomime.video.hand_tracks import at_rest
+from pianomime.video.strays import strays
 from pianomime.world.figures import key_centres
 
 _RATE = 20.0
@@ -43,8 +45,11 @@ def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demo
         most: of them at most.
 
     Raises:
-        InputError: the data are not of a kind that is known.
+        OSError: there is no such file, or it cannot be read.
+        InputError: the data are not of a kind that is known, or none are asked for.
     """
+    if most is not None and most < 1:
+        raise InputError(f"{most} clips are none: 1 at least are needed")
     clips = _zarr(source) if source.is_dir() else _npz(source)
     names = [f"{source.stem}-{number:03d}" for number in range(len(clips))]
     if len(clips) == 1:
@@ -122,19 +127,20 @@ def _mend(tips: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """The points with those that were never seen, or seen wrongly, put between their neighbours."""
     if tips.ndim != 4 or tips.shape[1:] != (2, 6, 3) or not len(tips):
         raise InputError(f"fingertips must be (T, 2, 6, 3), not {tips.shape}")
-    bad = ~np.isfinite(tips).all(axis=3) | (tips[..., 2] > _NEVER_SEEN)
-    flat = tips[..., :2]
-    if len(tips) >= 3:
-        between = (flat[:-2] + flat[2:]) / 2
-        off = np.linalg.norm(flat[1:-1] - between, axis=3)
-        bad[1:-1] |= off > _JUMP + np.linalg.norm(flat[2:] - flat[:-2], axis=3)
+    bad = tips[..., 2] > _NEVER_SEEN
+    for hand, point in np.ndindex(2, 6):
+        bad[:, hand, point] |= strays(tips[:, hand, point, :2], _JUMP)
     # A finger that presses is where its key is.
     bad &= tips[..., 2] != 0.0
+    unknown = ~np.isfinite(tips).all(axis=3)
+    bad |= unknown
     mended = tips.copy()
     time = np.arange(len(tips))
     for hand, point in np.ndindex(2, 6):
         wrong = bad[:, hand, point]
-        if wrong.any() and not wrong.all():
+        if wrong.all():
+            mended[unknown[:, hand, point], hand, point] = *at_rest(hand)[point], HIGH
+        elif wrong.any():
             for axis in range(2):
                 mended[wrong, hand, point, axis] = np.interp(
                     time[wrong], time[~wrong], tips[~wrong, hand, point, axis]
@@ -158,24 +164,23 @@ _Clip = tuple[NDArray[np.float64], NDArray[np.bool_] | None]
 
 
 def _npz(path: Path) -> list[_Clip]:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
-    except FileNotFoundError:
-        raise InputError(f"{path}: does not exist") from None
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not an .npz file of arrays ({error})") from error
+    arrays = read_arrays(path, "an .npz file of arrays")
     if "fingertips" not in arrays:
         raise InputError(f"{path}: holds no fingertips")
     tips = arrays["fingertips"]
-    if "goal_packed" in arrays:
-        unpacked = np.unpackbits(arrays["goal_packed"], axis=1)[:, :KEYS]
-        goal: NDArray[np.bool_] | None = unpacked.astype(bool)
-    else:
-        goal = arrays.get("goal")
+    if tips.ndim != 4 or tips.shape[1:] != (2, 6, 3) or tips.dtype.kind not in "fiu":
+        raise InputError(f"{path}: fingertips must be numbers (T, 2, 6, 3), not {tips.shape}")
+    goal: NDArray[np.bool_] | None = arrays.get("goal")
+    packed = arrays.get("goal_packed")
+    if packed is not None:
+        if packed.ndim != 2 or packed.dtype != np.uint8:
+            raise InputError(f"{path}: goal_packed must be bytes ({len(tips)}, {(KEYS + 7) // 8})")
+        goal = np.unpackbits(packed, axis=1)[:, :KEYS].astype(bool)
     if goal is not None and goal.shape != (len(tips), KEYS):
         raise InputError(f"{path}: goals must be ({len(tips)}, {KEYS}), not {goal.shape}")
     length = arrays.get("length", np.array([len(tips)]))
+    if length.dtype.kind not in "iu" or length.ndim != 1 or (length < 1).any():
+        raise InputError(f"{path}: the lengths of the clips must be whole numbers from 1 on")
     if int(length.sum()) != len(tips):
         raise InputError(f"{path}: the lengths of the clips do not add up to {len(tips)} frames")
     ends = np.cumsum(length)
@@ -191,7 +196,7 @@ def _zarr(folder: Path) -> list[_Clip]:
         zarr: Any = importlib.import_module("zarr")
     except ImportError as error:
         raise InputError(
-            f"{folder}: reading it needs the package zarr: pip install 'pianomime[video]'"
+            f"{folder}: reading it needs the package zarr: pip install -e '.[video]'"
         ) from error
     wanted = f"{folder}: not PianoMime's high-level data set"
     try:

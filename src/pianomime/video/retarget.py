@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.music import KEYS, Score
-from pianomime.plan import LEFT
+from pianomime.music.score import MAX_SECONDS
+from pianomime.plan import LEFT, RIGHT
 from pianomime.video.align import Rule, align
 from pianomime.video.demonstration import Demonstration, on_grid
 from pianomime.video.film import Film
@@ -33,8 +35,8 @@ from pianomime.video.stretches import RATE, stretches
 Tell = Callable[[str, int, int], None]
 
 _BACKGROUND_FRAMES = 25
-_FEWEST_HANDS = 0.05
-"""Share of the frames in which a hand must be seen for the video to be one of playing."""
+_MOST_FRAMES = int(MAX_SECONDS * RATE) - 1
+"""That a score can be as long as; files need not say how long they are."""
 _TOO_FEW_TOUCHED = 0.5
 """Share of a MIDI file's notes with a finger on their key below which it is of another song."""
 _FEW_TOUCHED = 0.7
@@ -94,22 +96,27 @@ def retarget(
     config = config or RetargetConfig()
     tell = tell or (lambda stage, done, total: None)
     # What can be wrong is looked at before what takes long.
+    if config.offset is not None and not abs(config.offset) <= MAX_SECONDS:
+        raise InputError(f"--offset must be a time in the video, not {config.offset:g} s")
+    named = None if config.points is None else read_points(config.points)
     score = None if config.midi is None else Score.from_midi(config.midi)
     film = Film(video)
+    if film.seconds > MAX_SECONDS:
+        raise InputError(f"{video}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
     model = find_hand_model(config.hand_model)
     remarks: list[str] = []
     tell("keyboard", 0, 0)
     background = _background(film)
-    if config.points is None:
+    if named is None:
         ways = find_keyboards(background)
         if not ways:
             raise InputError(
                 f"{video}: no keyboard found; show where it is with `pianomime pick {video}`"
             )
         seen = ways[0].describe()
-        planes = [way.plane for way in ways]
+        # Which octave it is only the notes can tell, and each way takes memory.
+        planes = [way.plane for way in (ways if score is not None else ways[:1])]
     else:
-        named = read_points(config.points)
         seen = named.describe()
         planes = [named.plane.zoomed(1 / film.zoom)]
         ways = []
@@ -127,18 +134,24 @@ def retarget(
             )
     _check_hands(video, tracks, remarks)
     remarks += _hidden(light)
+    if len(tracks) == _MOST_FRAMES:
+        remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
     score, facts = _score(film, score, offset, tracks, light, config, remarks)
+    # Of hours of video it is what takes most memory.
+    del watched, light
     frames = score.frames()
     points = _rows(tracks.points, frames)
-    fingers = find_note_fingers(score, points)
+    fingers = find_note_fingers(score, points, tracks.seen)
     straight = without_parallax(points, score, fingers)
-    fingers = find_note_fingers(score, straight.points)
+    fingers = find_note_fingers(score, straight.points, tracks.seen)
     plan = align(score, straight.points, fingers, config.align)
     if fingers.guessed.any():
         remarks.append(
             f"{int(fingers.guessed.sum())} of {len(score)} notes have no finger near their key: "
             "theirs is a guess"
         )
+    if plan.dropped:
+        remarks.append(f"{plan.dropped} of {len(score)} notes are played by no finger")
     for first, end, hand in poorly_seen(tracks):
         which = "left" if hand == LEFT else "right"
         remarks.append(f"the {which} hand is not seen from {first:.1f} s to {end:.1f} s")
@@ -195,7 +208,7 @@ def _watch(film: Film, planes: list[Plane], model: Path, tell: Tell) -> _Watched
     light = [bytearray() for _ in planes]
     total = round(film.seconds * RATE)
     with HandDetector(model) as detector:
-        for number, frame in enumerate(film.frames(RATE)):
+        for number, frame in enumerate(islice(film.frames(RATE), _MOST_FRAMES)):
             sightings.append(detector.detect(frame.picture, round(number * 1000 / RATE)))
             for reader, kept in zip(readers, light, strict=True):
                 kept += reader.read(frame.picture).tobytes()
@@ -223,11 +236,10 @@ def _best_way(
 
 
 def _check_hands(video: Path, tracks: HandTracks, remarks: list[str]) -> None:
-    share = tracks.found.mean(axis=0)
-    if share.max(initial=0.0) < _FEWEST_HANDS:
+    if not tracks.seen.any():
         raise InputError(f"{video}: no hands are seen playing")
-    for hand, name in ((0, "left"), (1, "right")):
-        if share[hand] < _FEWEST_HANDS:
+    for hand, name in ((LEFT, "left"), (RIGHT, "right")):
+        if not tracks.seen[hand]:
             remarks.append(f"only one hand is seen: the {name} one is made up, at rest")
 
 
@@ -236,6 +248,8 @@ def _hidden(light: NDArray[np.uint8]) -> list[str]:
     far_end = light[:, list(ZONES).index("far end")]
     usual = np.median(far_end[:: max(1, len(light) // 2000)].mean(axis=2), axis=0)
     usual = usual - usual.mean()
+    if not usual.any():
+        return []  # none of it is within the picture
     likeness = np.empty(len(light))
     # In blocks: hours at once take much memory.
     for first in range(0, len(light), 10_000):
@@ -313,7 +327,7 @@ def _score(
             cut, onset=cut.onset - begin, offset=cut.offset - begin, pedal=cut.pedal - begin
         )
     return on_grid(timed), {
-        "notes_from": str(config.midi),
+        "notes_from": "" if config.midi is None else config.midi.name,
         "offset_seconds": round(offset.seconds, 4),
         "notes_touched": round(offset.touched, 4),
         "notes_touched_by_chance": round(offset.by_chance, 4),
@@ -322,4 +336,6 @@ def _score(
 
 def _rows(points: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
     """As many rows as frames: the last one is held, or what is too much left out."""
-    return points[np.minimum(np.arange(frames), len(points) - 1)]
+    if frames <= len(points):
+        return points[:frames]
+    return np.pad(points, ((0, frames - len(points)), (0, 0), (0, 0), (0, 0)), "edge")

@@ -36,12 +36,13 @@ def touching(points: NDArray[np.float64], key: int) -> NDArray[np.float32]:
     """(T,) how well the best of all fingertips fits a key, 0..1.
 
     Args:
-        points: (T, 2, 6, 2) as in `HandTracks`.
+        points: (T, H, 6, 2) as `HandTracks.seen_points` gives them.
         key: 0..87.
     """
     best = np.empty(len(points), np.float32)
     # In blocks: hours at once take much memory.
     for first in range(0, len(points), _BLOCK):
         part = slice(first, first + _BLOCK)
-        best[part] = np.exp(-misfit(points[part, :, 1:], np.int64(key)).min(axis=(1, 2)))
+        off = misfit(points[part, :, 1:], np.int64(key)).min(axis=(1, 2), initial=np.inf)
+        best[part] = np.exp(-off)
     return best
