@@ -63,7 +63,7 @@ def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> 
     assert "paper, best" in fails(["train-expert", "demo.npz", "--preset", "worst"], capsys)
     assert "steps" in fails(["train-expert", "demo.npz", "--steps", "0"], capsys)
     assert "no such file" in fails(["train-expert", "nothing.mid"], capsys)
-    assert "does not exist" in fails(["train-expert", "nothing.npz"], capsys)
+    assert "No such file" in fails(["train-expert", "nothing.npz"], capsys)
     assert "a second" in fails(["train-expert", "demo.npz", "--seconds", "0.2"], capsys)
     Path("other").mkdir()
     assert "not the folder of a run" in fails(["play", "demo.npz", "--player", "other"], capsys)
