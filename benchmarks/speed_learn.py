@@ -3,7 +3,7 @@
 The peer is RoboPianist in Stable-Baselines3's SubprocVecEnv, in a Python of its own that
 `benchmarks/install_robopianist.py --learning` makes; without it, only ours are timed. Both are run
 in turns, several rounds, so that whatever else the machine does hits them alike; medians count.
-PPO has the network and the batch of the paper (tables 6 and 7); a step is 0.05 s of playing in one
+PPO has the network and the batch of the paper (table 6); a step is 0.05 s of playing in one
 environment. Ours is the `paper` preset with its inverse kinematics, which the peer has none of.
 """
 

@@ -16,6 +16,7 @@ from pianomime.plan import Planner, ZeroShotPlanner
 from pianomime.track import (
     DynamicTracker,
     IkTracker,
+    PedalTracker,
     RolloutConfig,
     RolloutTracker,
     Tracker,
@@ -158,6 +159,8 @@ class Player:
         for frame in range(frames):
             broken = world.blow_ups
             ctrl[frame] = self.tracker.control(frame, world)
+            if isinstance(self.tracker, PedalTracker):
+                pedal[frame] = self.tracker.pedal(frame)
             world.step(ctrl[frame], pedal=bool(pedal[frame]))
             qpos[frame], key_state[frame] = world.qpos, world.key_state
             pressed[frame] = world.pressed

@@ -242,6 +242,85 @@ def test_the_policy_can_work_the_pedal(two_notes: Demonstration) -> None:
     assert step.reward[1] - step.reward[0] == pytest.approx(1.0)
 
 
+def test_what_ends_is_told_apart_from_what_begins(two_notes: Demonstration) -> None:
+    """The last observation of an episode is told aside, and that of the next in its place."""
+    frames = len(two_notes.plan)
+    config = EnvConfig(
+        observation=ObservationConfig(time=True), episode=EpisodeConfig(frames=frames - 5)
+    )
+    alone = SongBatch(two_notes, config, 1)
+    vec = SongVecEnv(SongBatch(two_notes, config, 2))
+    envs = gymnasium.make_vec(
+        "pianomime/Song-v0", num_envs=2, demonstration=two_notes, config=config
+    )
+    alone.reset(np.random.default_rng(0))
+    first = alone.observations[0].copy()
+    vec.reset()
+    envs.reset(seed=0)
+    for action in actions(frames - 5, 1):
+        step = alone.step(action)
+        both = np.repeat(action, 2, axis=0)
+        seen, _, done, infos = vec.step(both)
+        shown, _, _, truncated, info = envs.step(both)
+    last = alone.observations[0]
+    assert last[-1] == pytest.approx((frames - 5) / frames)
+    assert step.truncated[0]
+    assert done.all()
+    assert truncated.all()
+    for row in range(2):
+        np.testing.assert_array_equal(infos[row]["terminal_observation"], last)
+        np.testing.assert_array_equal(info["final_obs"][row], last)
+        np.testing.assert_array_equal(seen[row], first)
+        np.testing.assert_array_equal(shown[row], first)
+        assert infos[row]["f1"] == info["final_info"]["f1"][row] == step.f1[0]
+    assert info["final_info"]["frame"].tolist() == [frames - 5] * 2
+    assert info["frame"].tolist() == [0, 0]
+    assert info["f1"].tolist() == [0.0, 0.0]
+
+
+def test_stepping_past_the_end_is_refused(two_notes: Demonstration) -> None:
+    batch = SongBatch(two_notes, EnvConfig(), 1)
+    batch.reset(np.random.default_rng(0))
+    for action in actions(len(two_notes.plan), 1):
+        batch.step(action)
+    with pytest.raises(ValueError, match="reset it first"):
+        batch.step(np.zeros((1, 46)))
+
+
+def test_poses_are_told_in_a_common_size(two_notes: Demonstration) -> None:
+    """Against what a World and MuJoCo's own figures say, joint by joint."""
+    config = ObservationConfig(errors=True)
+    batch = SongBatch(two_notes, EnvConfig(observation=config), 1)
+    batch.reset(np.random.default_rng(0))
+    world = World()
+    for action in actions(8, 1):
+        batch.step(action)
+    world.set_state(batch.state()["worlds"][0])
+    seen = {name: batch.observations[0, where] for name, where in batch.observer.slices.items()}
+    low, high = world.model.jnt_range[88:].T
+    # The right hand comes first, as in the model.
+    assert world.model.joint(88).name.startswith("rh_")
+    told = (low + high) / 2 + seen["joints"] * (high - low) / 2
+    np.testing.assert_allclose(told, world.data.qpos[88:], atol=1e-5)
+    assert np.abs(seen["joints"]).max() < 1.2
+    np.testing.assert_allclose(seen["velocities"] * 10.0, world.data.qvel[88:], atol=1e-5)
+    np.testing.assert_allclose(seen["keys"], world.key_state, atol=1e-6)
+    assert world.key_state.any() or not seen["keys"].any()
+    # Fingertips and their targets have the left hand first.
+    away = two_notes.plan.fingertips[8, :, 1:] - world.fingertips[:, 1:]
+    np.testing.assert_allclose(seen["errors"].reshape(2, 5, 3) * 0.05, away, atol=1e-6)
+
+
+def test_a_start_in_the_middle_has_the_pedal_as_it_is(two_notes: Demonstration) -> None:
+    config = EnvConfig(episode=EpisodeConfig(start="anywhere"))
+    batch = SongBatch(two_notes, config, 64)
+    batch.reset(np.random.default_rng(0))
+    pedal = np.r_[False, two_notes.score.pedal_roll()]
+    told = batch.observations[:, batch.observer.slices["pedal"]][:, 0]
+    np.testing.assert_array_equal(told, pedal[batch.frames])
+    assert 0 < told.sum() < len(told)
+
+
 def test_presets_are_named_in_mistakes() -> None:
     with pytest.raises(ValueError, match="paper, best"):
         preset_config("worst")

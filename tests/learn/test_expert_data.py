@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,9 @@ def test_it_reads_in_a_few_lines(runs: Path, tmp_path: Path) -> None:
         Collect((runs,), runs).run()
 
 
-def test_what_fails_leaves_the_older_data(runs: Path, tmp_path: Path) -> None:
+def test_what_fails_leaves_the_older_data(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = tmp_path / "experts.zarr"
     Collect((runs,), out).run()
     (runs / "b" / "expert.safetensors").write_bytes(b"cut")
@@ -81,6 +84,20 @@ def test_what_fails_leaves_the_older_data(runs: Path, tmp_path: Path) -> None:
     assert len(ExpertData.open(out)) == 2
     with pytest.raises(InputError, match="no episodes"):
         write_expert_data(out, iter(()))
+    replace = os.replace
+
+    def fails(source: str | Path, target: str | Path) -> None:
+        # The fresh data set has its name already; the older one was moved aside.
+        if Path(target) == out and Path(source).name == out.name:
+            raise OSError("cannot be moved")
+        replace(source, target)
+
+    episode = ExpertData.open(out).episode(0)
+    with monkeypatch.context() as patch:
+        patch.setattr("pianomime.learn.expert_data.os.replace", fails)
+        with pytest.raises(OSError, match="cannot be moved"):
+            write_expert_data(out, iter([episode]))
+    assert len(ExpertData.open(out)) == 2
 
 
 @pytest.mark.parametrize(
@@ -144,6 +161,14 @@ def test_published_files_of_another_shape(tmp_path: Path) -> None:
     np.savez(tmp_path / "other.npz", length=[3])
     with pytest.raises(InputError, match="clip_id"):
         next(published_episodes(tmp_path / "experts.npz", tmp_path / "other.npz"))
+    with np.load(tmp_path / "demonstrations.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "longer.npz", **{**arrays, "length": [4, 7]})
+    with pytest.raises(InputError, match="clip 7 is not as long"):
+        next(published_episodes(tmp_path / "experts.npz", tmp_path / "longer.npz"))
+    np.savez(tmp_path / "odd.npz", **{**arrays, "length": [11]})
+    with pytest.raises(InputError, match="do not add up"):
+        next(published_episodes(tmp_path / "experts.npz", tmp_path / "odd.npz"))
     with pytest.raises(InputError, match="does not exist"):
         next(published_episodes(tmp_path / "none.npz", tmp_path / "other.npz"))
 

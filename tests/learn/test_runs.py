@@ -10,16 +10,21 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import torch
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from pianomime.errors import InputError
 from pianomime.learn import tensors
 from pianomime.learn.config import (
     ActionConfig,
     EnvConfig,
+    EpisodeConfig,
     ExpertConfig,
+    ObservationConfig,
     PpoConfig,
     RewardConfig,
     from_json,
@@ -27,11 +32,17 @@ from pianomime.learn.config import (
 )
 from pianomime.learn.expert import load_expert, train_expert
 from pianomime.learn.expert_worker import Request
+from pianomime.learn.ppo import make_model
 from pianomime.learn.run_folder import RunFolder
+from pianomime.learn.run_lock import run_lock
+from pianomime.learn.song_batch import SongBatch
+from pianomime.learn.song_vec_env import SongVecEnv
 from pianomime.plan import FingertipPlan
 from pianomime.video.demonstration import Demonstration
+from pianomime.world import WorldBatch
 
 METHODS = ("ppo", "search")
+NOTHING = ObservationConfig(False, False, False, 0, 0, False, False)
 
 
 @pytest.fixture
@@ -77,6 +88,7 @@ def kill_after_a_checkpoint(request: Request) -> None:
     """Start the training in a process, and kill it in the middle."""
     process = subprocess.Popen(
         [sys.executable, "-m", "pianomime.learn.expert_worker", request.text],
+        stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
     )
     curve = Path(request.out, "curve.json")
@@ -131,6 +143,125 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(
     assert tensors_of(RunFolder.load(out)) == before
     assert not [name for name in os.listdir(out) if name.startswith(".")]
     assert train_expert(demo, out, longer, threads=1).steps_done == longer.steps
+
+
+@pytest.mark.parametrize("left", [(), ("song.npz",)])
+def test_a_run_that_was_killed_at_its_beginning_begins_anew(
+    demo: Path,
+    two_notes: Demonstration,
+    tmp_path: Path,
+    small_search: ExpertConfig,
+    left: tuple[str, ...],
+) -> None:
+    whole, out = tmp_path / "whole", tmp_path / "run"
+    train_expert(demo, whole, small_search)
+    out.mkdir()
+    for name in left:
+        (out / name).write_bytes((whole / name).read_bytes())
+    # What a kill in the middle of writing a file leaves of it.
+    for name in (".song-a1b2c3", ".run-x_y_z0"):
+        (out / name).mkdir()
+        (out / name / "half").write_bytes(b"cut")
+    again = train_expert(demo, out, small_search)
+    assert again.curve() == RunFolder.load(whole).curve()
+    assert not [name for name in os.listdir(out) if name.startswith(".")]
+    # A song of somebody else is no beginning.
+    (tmp_path / "theirs").mkdir()
+    two_notes.save(tmp_path / "theirs" / "song.npz")
+    before = (tmp_path / "theirs" / "song.npz").read_bytes()
+    with pytest.raises(InputError, match="something else"):
+        train_expert(demo, tmp_path / "theirs", small_search)
+    assert (tmp_path / "theirs" / "song.npz").read_bytes() == before
+    # Also when it goes on; what is not ours stays.
+    for name in (".state-0000", ".mine"):
+        (out / name).mkdir()
+    train_expert(demo, out, small_search)
+    assert [name for name in os.listdir(out) if name.startswith(".")] == [".mine"]
+
+
+def test_one_process_at_a_time_trains_in_a_folder(tmp_path: Path) -> None:
+    with run_lock(tmp_path / "run"):
+        with pytest.raises(InputError, match="another process"), run_lock(tmp_path / "run", 0.0):
+            pass
+        with run_lock(tmp_path / "other", 0.0):
+            pass
+    with run_lock(tmp_path / "run", 0.0):
+        pass
+
+
+def test_a_search_has_the_threads_that_it_is_given(
+    demo: Path, tmp_path: Path, small_search: ExpertConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: set[int] = set()
+
+    def recorded(worlds: int, threads: int = 0, quiet: bool = False) -> WorldBatch:
+        asked.add(threads)
+        return WorldBatch(worlds, threads, quiet)
+
+    monkeypatch.setattr("pianomime.track.rollout.WorldBatch", recorded)
+    one = train_expert(demo, tmp_path / "one", small_search, threads=1)
+    assert asked == {1}
+    two = train_expert(demo, tmp_path / "two", small_search, threads=2)
+    assert asked == {1, 2}
+    assert one.curve() == two.curve()
+
+
+@pytest.mark.parametrize("config", METHODS, indirect=True)
+def test_the_curve_is_in_tensorboard(demo: Path, tmp_path: Path, config: ExpertConfig) -> None:
+    run = train_expert(demo, tmp_path / "run", config, threads=1)
+    log = EventAccumulator(str(run.tensorboard))
+    log.Reload()
+    for name in ("precision", "recall", "f1"):
+        told = [(event.step, event.value) for event in log.Scalars(f"song/{name}")]
+        assert told == [
+            (one.steps, pytest.approx(getattr(one, name), abs=1e-6)) for one in run.curve()
+        ]
+
+
+def test_the_policy_works_the_pedal_when_it_plays(
+    demo: Path, tmp_path: Path, small_ppo: ExpertConfig
+) -> None:
+    env = EnvConfig(action=ActionConfig(pedal=True), reward=RewardConfig(pedal=1.0))
+    run = train_expert(demo, tmp_path / "run", dataclasses.replace(small_ppo, env=env), threads=1)
+    best, about = run.best()
+    arrays = {name: array.copy() for name, array in best.items()}
+    assert arrays["4.bias"].shape == (47,)
+    score = run.song.score
+    for sign in (1.0, -1.0):
+        # The last layer alone says where the pedal is.
+        arrays["4.weight"][46], arrays["4.bias"][46] = 0.0, sign
+        tensors.write_tensors(run.path / "expert.safetensors", arrays, about)
+        assert (load_expert(run.path)[0].play(score).pedal == (sign > 0)).all()
+    plain = train_expert(demo, tmp_path / "plain", small_ppo, threads=1)
+    played = load_expert(plain.path)[0].play(score)
+    np.testing.assert_array_equal(played.pedal, score.pedal_roll())
+
+
+@pytest.mark.parametrize(
+    ("activation", "layer"), [("gelu", torch.nn.GELU), ("tanh", torch.nn.Tanh)]
+)
+def test_the_networks_are_as_the_settings_say(
+    two_notes: Demonstration, activation: str, layer: type[torch.nn.Module]
+) -> None:
+    settings = PpoConfig(
+        envs=2,
+        steps_per_update=32,
+        batch=32,
+        epochs=1,
+        hidden=(24, 12, 6),
+        activation=activation,  # type: ignore[arg-type]
+        learning_rate=1e-3,
+        decay=0.5,
+    )
+    model = make_model(SongVecEnv(SongBatch(two_notes, EnvConfig(), 2, 1)), settings, 0)
+    for network in (model.policy.mlp_extractor.policy_net, model.policy.mlp_extractor.value_net):
+        assert [part.out_features for part in network[::2]] == [24, 12, 6]
+        assert all(isinstance(part, layer) for part in network[1::2])
+    rates = []
+    for _ in range(3):
+        model.learn(32, reset_num_timesteps=False)
+        rates.append(model.policy.optimizer.param_groups[0]["lr"])
+    np.testing.assert_allclose(rates, [1e-3, 5e-4, 2.5e-4])
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -219,10 +350,10 @@ def test_songs_that_nothing_can_be_learned_on(
         arrays = dict(file)
     blind = {**arrays, "plan_fingertips": np.full_like(arrays["plan_fingertips"], np.nan)}
     np.savez(odd, **blind)
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(InputError, match="not a demonstration"):
         train_expert(odd, tmp_path / "run", small_search)
     np.savez(long, **{**arrays, "score_offset": arrays["score_offset"] + 1.0})
-    with pytest.raises(InputError, match="rows of a plan for"):
+    with pytest.raises(InputError, match="not a demonstration"):
         train_expert(long, tmp_path / "run", small_search)
     idle = FingertipPlan(
         two_notes.plan.fingertips,
@@ -239,14 +370,31 @@ def test_songs_that_nothing_can_be_learned_on(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"envs": 3}, "multiple"),
-        ({"batch": 1}, "batch"),
-        ({"batch": 4096}, "batch"),
+        ({"steps": 0}, "steps must be 1 or more"),
+        ({"seed": -1}, "seed must be 0 or more"),
+        ({"ppo": {"envs": 3}}, "multiple"),
+        ({"ppo": {"batch": 1}}, "ppo.batch"),
+        ({"ppo": {"batch": 4096}}, "ppo.batch"),
+        ({"ppo": {"evaluate_every": 0}}, "ppo.evaluate-every must be 1 or more"),
+        ({"ppo": {"noise": 0.0}}, "ppo.noise must be more than 0"),
+        ({"ppo": {"learning_rate": float("nan")}}, "ppo.learning-rate"),
+        ({"ppo": {"hidden": (0,)}}, "ppo.hidden"),
+        ({"ppo": {"discount": 1.5}}, "ppo.discount must be 0 to 1"),
+        ({"method": "search", "search": {"sizes": ()}}, "search.sizes"),
+        ({"method": "search", "search": {"ahead": 0}}, "search.ahead must be 1 or more"),
+        ({"env": {"episode": EpisodeConfig(frames=-5)}}, "env.episode.frames must be 0 or more"),
+        ({"env": {"observation": NOTHING}}, "must see something"),
     ],
 )
 def test_settings_that_do_not_fit(
-    demo: Path, tmp_path: Path, small_ppo: ExpertConfig, change: dict[str, int], message: str
+    demo: Path, tmp_path: Path, small_ppo: ExpertConfig, change: dict[str, Any], message: str
 ) -> None:
-    odd = dataclasses.replace(small_ppo, ppo=dataclasses.replace(small_ppo.ppo, **change))
+    changed = {
+        name: dataclasses.replace(getattr(small_ppo, name), **value)
+        if isinstance(value, dict)
+        else value
+        for name, value in change.items()
+    }
     with pytest.raises(InputError, match=message):
-        train_expert(demo, tmp_path / "run", odd)
+        train_expert(demo, tmp_path / "run", dataclasses.replace(small_ppo, **changed))
+    assert not (tmp_path / "run").exists()

@@ -77,10 +77,11 @@ class Play:
     def _cast(self) -> tuple[Player, Score, str]:
         """Who plays what, and the name of its file."""
         from pianomime.music import Score
-        from pianomime.play import PLAYERS, Player, excerpt
+        from pianomime.play import DEMONSTRATION_PLAYERS, PLAYERS, Player, excerpt
         from pianomime.song_files import find_song
 
-        if self.player is not None and Path(self.player).is_dir():
+        known = {*PLAYERS, *DEMONSTRATION_PLAYERS}
+        if self.player is not None and self.player not in known and Path(self.player).is_dir():
             return self._cast_expert(Path(self.player))
         if Path(self.song).suffix == ".npz":
             from pianomime.video.demonstration import Demonstration
@@ -99,7 +100,11 @@ class Play:
     def _cast_expert(self, folder: Path) -> tuple[Player, Score, str]:
         """The expert of a run; it plays the excerpt that it was trained on."""
         from pianomime.commands.extras import extra
+        from pianomime.errors import InputError
 
+        for name in ("start", "seconds", "effort"):
+            if getattr(self, name) != getattr(Play, name):
+                raise InputError(f"--{name}: an expert plays what it was trained on, as it does")
         with extra("train"):
             from pianomime.learn.expert import load_expert
             from pianomime.learn.song import load_score

@@ -17,7 +17,7 @@ from pianomime.learn.run_folder import RunFolder
 from pianomime.learn.song_batch import prior_tracker
 from pianomime.music import frame_metrics
 from pianomime.plan import NO_KEY, FingertipPlan
-from pianomime.track import IkTracker
+from pianomime.track import IkTracker, PedalTracker
 from pianomime.world import World
 from pianomime.world.figures import HAND_JOINTS, KEYS, key_travel
 from pianomime.world.moment import PRESSED_WITHIN
@@ -95,6 +95,8 @@ def play_episode(run: RunFolder) -> Episode:
         columns["prior"][frame] = prior.control(frame, world)
         ctrl = tracker.control(frame, world)
         columns["action"][frame] = ctrl
+        if isinstance(tracker, PedalTracker):
+            pedal[frame] = tracker.pedal(frame)
         world.step(ctrl, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
     _fill(columns, goal, plan.fingertips, plan.finger_key)
@@ -119,15 +121,19 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         (experts, recorded, "ctrl_1e4"),
         (demonstrations, human, "goal_packed"),
     ):
-        if arrays["length"].sum() != len(arrays[column]):
+        fits = arrays["length"].shape == arrays["clip_id"].shape
+        if not fits or arrays["length"].sum() != len(arrays[column]):
             raise InputError(f"{path}: the lengths of the clips do not add up")
     human_ends = dict(zip(human["clip_id"].tolist(), np.cumsum(human["length"]), strict=True))
+    human_lengths = dict(zip(human["clip_id"].tolist(), human["length"], strict=True))
     ends = np.cumsum(recorded["length"])
     for clip, end, length in zip(
         recorded["clip_id"].tolist(), ends, recorded["length"], strict=True
     ):
         if clip not in human_ends:
             raise InputError(f"{demonstrations}: has no clip {clip}")
+        if human_lengths[clip] != length:
+            raise InputError(f"{demonstrations}: clip {clip} is not as long as in {experts}")
         rows = slice(end - length, end)
         theirs = slice(human_ends[clip] - length, human_ends[clip])
         columns = _empty(int(length))

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from pianomime.errors import InputError
 from pianomime.learn.config import ExpertConfig
+from pianomime.learn.config_check import check_config
 from pianomime.learn.run_folder import RunFolder
+from pianomime.learn.run_lock import run_lock
 from pianomime.learn.song import load_song
 from pianomime.learn.stored_tracker import StoredTracker
 from pianomime.learn.tell import Tell
@@ -32,8 +34,8 @@ def train_expert(
         config: how.
         start: where the excerpt begins [s].
         seconds: its length at most [s].
-        threads: of PPO's physics and networks; 0 for one on each core. Curves are the same only
-            with the same number.
+        threads: of the physics and of PPO's networks; 0 for one on each core. PPO's curves are
+            the same only with the same number.
         tell: told how far it is.
 
     Returns:
@@ -43,20 +45,21 @@ def train_expert(
         InputError: the song, the config or what is in the folder cannot be used.
         OSError: the folder cannot be written; what was there before stays.
     """
-    if config.steps < 1:
-        raise InputError(f"steps must be 1 or more, not {config.steps}")
-    run = RunFolder.open(out, load_song(song, start, seconds), config, start, seconds)
-    if run.finished:
-        return run
+    check_config(config)
+    loaded = load_song(song, start, seconds)
     told = tell or (lambda done, total, remark: None)
-    if config.method == "ppo":
-        from pianomime.learn.ppo import train_ppo
+    with run_lock(out):
+        run = RunFolder.open(out, loaded, config, start, seconds)
+        if run.finished:
+            return run
+        if config.method == "ppo":
+            from pianomime.learn.ppo import train_ppo
 
-        train_ppo(run, threads, told)
-    else:
-        from pianomime.learn.search import search
+            train_ppo(run, threads, told)
+        else:
+            from pianomime.learn.search import search
 
-        search(run, told)
+            search(run, threads, told)
     return run
 
 

@@ -75,10 +75,16 @@ def write_expert_data(path: Path, episodes: Iterator[Episode]) -> int:
         marks = group.create_array("episode_end", data=np.array(ends[1:], np.int64))
         marks.attrs["about"] = "one past the last row of each episode"
         group.attrs.update({"format": FORMAT, "version": VERSION, "episodes": about})
+        older = Path(folder, "older")
         if path.exists():
-            os.replace(path, Path(folder, "older"))
-        os.replace(fresh, path)
-        shutil.rmtree(Path(folder, "older"), ignore_errors=True)
+            os.replace(path, older)
+        try:
+            os.replace(fresh, path)
+        except BaseException:
+            if older.exists():
+                os.replace(older, path)
+            raise
+        shutil.rmtree(older, ignore_errors=True)
     return len(about)
 
 

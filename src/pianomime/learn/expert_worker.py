@@ -1,6 +1,7 @@
 """The process in which one expert of many is trained: a request in, a row out, as JSON.
 
-A process of its own, so that a crash costs one song; what it had is in the folder of its run.
+A process of its own, so that a crash costs one song; what it had is in the folder of its run. It
+ends when its input does, and so does not outlive the process that asked, however that ends.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 import time
 import traceback
 import warnings
@@ -74,7 +76,8 @@ def train_one(request: Request) -> Row:
         where = traceback.extract_tb(error.__traceback__)[-1]
         reason = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
         return {"song": song, "error": reason}
-    return {"song": song, **best, "seconds": round(time.perf_counter() - began, 1)}
+    spent = {"steps": run.steps_done, "seconds": round(time.perf_counter() - began, 1)}
+    return {"song": song, **best, **spent}
 
 
 class ExpertProcess:
@@ -89,7 +92,8 @@ class ExpertProcess:
         self._process = subprocess.Popen(
             [sys.executable, "-m", "pianomime.learn.expert_worker", request.text],
             stdout=subprocess.PIPE,
-            stdin=subprocess.DEVNULL,
+            # Nothing is ever written to it; it ends with this process.
+            stdin=subprocess.PIPE,
             encoding="utf-8",
             # One song a core: more threads in each would only get in each other's way.
             env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
@@ -113,8 +117,16 @@ class ExpertProcess:
         self._process.wait()
 
 
+def _end_with_input() -> None:
+    """End this process where it stands when its input ends, as after a kill of who asked."""
+    while os.read(0, 4096):
+        pass
+    os._exit(1)
+
+
 def main() -> None:
     """Train what the only argument asks for."""
+    threading.Thread(target=_end_with_input, daemon=True).start()
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     # Anything that a library prints must not get into the row.
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())

@@ -15,8 +15,10 @@ from typing import Any
 from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.learn.config import ExpertConfig
+from pianomime.learn.config_check import check_config
 from pianomime.learn.expert_worker import ExpertProcess, Request, Row
 from pianomime.learn.experts_figure import draw_experts
+from pianomime.learn.run_folder import is_run
 
 Progress = Callable[[int, int, float], None]
 """Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
@@ -53,10 +55,12 @@ def train_experts(
         A row for each song, in the order of their names.
 
     Raises:
-        InputError: there are no songs, or no such cluster.
+        InputError: settings do not fit, there are no songs, `out` is their folder, or there is no
+            such cluster.
         OSError: `out` cannot be written.
     """
-    songs = find_experts_songs(folder)
+    check_config(config)
+    songs = find_experts_songs(folder, out)
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
     if out.is_file():
@@ -91,15 +95,30 @@ def train_experts(
     return ordered
 
 
-def find_experts_songs(folder: Path) -> dict[str, Path]:
+def find_experts_songs(folder: Path, out: Path | None = None) -> dict[str, Path]:
     """Demonstrations and MIDI files of a folder by the names of their runs, in order.
 
+    Args:
+        folder: of songs; what runs in it keep for themselves is left out.
+        out: where results are, which are left out too.
+
     Raises:
-        InputError: there is no such folder, or nothing in it.
+        InputError: there is no such folder, nothing in it, or it is `out`.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder")
-    files = sorted(file for file in folder.rglob("*") if file.suffix.lower() in _SUFFIXES)
+    if out is not None and out.resolve() == folder.resolve():
+        raise InputError(f"{out}: holds the songs; name another folder for the results")
+    results = None if out is None else out.resolve()
+    if results is not None and not results.is_relative_to(folder.resolve()):
+        results = None  # Also where the songs are a folder among the results.
+    files = sorted(
+        file
+        for file in folder.rglob("*")
+        if file.suffix.lower() in _SUFFIXES
+        and not is_run(file.parent)
+        and not (results is not None and file.resolve().is_relative_to(results))
+    )
     if not files:
         raise InputError(f"{folder}: no demonstrations or MIDI files in this folder")
     names = ["-".join(file.relative_to(folder).with_suffix("").parts) for file in files]

@@ -14,7 +14,6 @@ from pianomime.learn.tensors import Arrays
 from pianomime.plan import FingertipPlan
 from pianomime.video.demonstration import Demonstration
 from pianomime.world import World
-from pianomime.world.hand import SIDES, Hand
 
 ACTIVATIONS = {"gelu": torch.nn.GELU, "relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 
@@ -30,7 +29,7 @@ def actor(config: PpoConfig, observations: int, actions: int) -> torch.nn.Sequen
 
 
 class PolicyTracker:
-    """Adds a policy's residual to what the prior proposes.
+    """Adds a policy's residual to what the prior proposes; works the pedal where it has learned to.
 
     Args:
         song: what it was trained on.
@@ -45,7 +44,8 @@ class PolicyTracker:
         self._observer = Observer(config.env.observation, song.score.roll(), song.plan)
         self._reach = config.env.action.factor * self._observer.ctrl_range
         self._network = network
-        self._hands = [Hand(side) for side in SIDES]
+        self._pedal = song.score.pedal_roll()
+        self._works_pedal = config.env.action.pedal
         self._row = np.zeros((1, self._observer.size), np.float32)
 
     @classmethod
@@ -72,21 +72,27 @@ class PolicyTracker:
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) the prior's control and the mean of the policy's residual."""
-        prior = self._prior.control(frame, world)
-        qpos = world.qpos
-        tips = np.array([hand.points(qpos[hand.joints])[1:] for hand in self._hands])
+        frames = np.array([frame])
+        prior, points = self._prior.controls(frames, world.qpos[None])
         self._observer.write(
             self._row,
             np.array([0]),
-            np.array([frame]),
+            frames,
             world.qpos_hands[None],
             world.qvel_hands[None],
             world.key_state[None],
-            tips[None],
-            prior[None],
+            points[:, :, 1:],
+            prior,
             np.array([world.pedal]),
         )
         with torch.inference_mode():
             action = self._network(torch.from_numpy(self._row))[0].numpy().astype(np.float64)
+        if self._works_pedal:
+            self._pedal[frame] = action[46] > 0.0
         residual: NDArray[np.float64] = self._reach * np.clip(action[:46], -1.0, 1.0)
-        return prior + residual
+        ctrl: NDArray[np.float64] = prior[0] + residual
+        return ctrl
+
+    def pedal(self, frame: int) -> bool:
+        """The policy's pedal, or the score's."""
+        return bool(self._pedal[frame])

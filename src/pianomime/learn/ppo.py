@@ -40,41 +40,26 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
         tell: told how far it is.
 
     Raises:
-        InputError: settings do not fit together, or the checkpoint is damaged.
+        InputError: the checkpoint is damaged.
         OSError: a checkpoint cannot be written; the one before stays.
     """
     settings = run.config.ppo
-    _check(settings)
     env = SongVecEnv(SongBatch(run.song, run.config.env, settings.envs, threads))
     model = make_model(env, settings, run.config.seed)
     model.set_logger(configure(str(run.tensorboard), ["tensorboard"]))
-    boundary = _Boundary(run, env, tell)
+    before = torch.get_num_threads()
+    boundary = _Boundary(run, env, threads or before, tell)
     boundary.init_callback(model)
     state = run.state()
     if state is not None:
         boundary.resume(*state)
     left = run.config.steps - model.num_timesteps
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads or before)
     try:
         # Steps that were taken before are added to those that it is told.
         model.learn(left, callback=boundary, reset_num_timesteps=state is None)
         boundary.between_updates()
     finally:
         torch.set_num_threads(before)
-
-
-def _check(settings: PpoConfig) -> None:
-    if settings.envs < 1 or settings.steps_per_update % settings.envs:
-        raise InputError(
-            f"steps per update ({settings.steps_per_update}) must be a multiple of "
-            f"envs ({settings.envs})"
-        )
-    if not 1 < settings.batch <= settings.steps_per_update:
-        raise InputError(
-            f"batch ({settings.batch}) must be from 2 to steps per update "
-            f"({settings.steps_per_update})"
-        )
 
 
 def make_model(env: SongVecEnv, settings: PpoConfig, seed: int) -> PPO:
@@ -115,9 +100,9 @@ def make_model(env: SongVecEnv, settings: PpoConfig, seed: int) -> PPO:
 class _Boundary(BaseCallback):
     """What happens between updates: evaluate, keep the best, write a checkpoint, seed anew."""
 
-    def __init__(self, run: RunFolder, env: SongVecEnv, tell: Tell) -> None:
+    def __init__(self, run: RunFolder, env: SongVecEnv, threads: int, tell: Tell) -> None:
         super().__init__()
-        self._run, self._env, self._tell = run, env, tell
+        self._run, self._env, self._threads, self._tell = run, env, threads, tell
         self._curve: list[Evaluation] = []
         self._fresh = True
 
@@ -145,6 +130,9 @@ class _Boundary(BaseCallback):
 
     def between_updates(self) -> None:
         """Evaluate and write what has been learned; begin the next update the same each time."""
+        # Passes forward gain nothing from more, and threads that wait for the next one keep cores
+        # from the physics.
+        torch.set_num_threads(1)
         steps = self.model.num_timesteps
         update = steps // self._run.config.ppo.steps_per_update
         # A checkpoint that was just read needs not be written again.
@@ -163,6 +151,9 @@ class _Boundary(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         self.between_updates()
+
+    def _on_rollout_end(self) -> None:
+        torch.set_num_threads(self._threads)
 
     def _on_step(self) -> bool:
         best = max((one.f1 for one in self._curve), default=0.0)

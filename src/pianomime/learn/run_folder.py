@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -60,7 +62,8 @@ class RunFolder:
     ) -> RunFolder:
         """Begin a run, or go on with one of the same song and config.
 
-        Only the steps may be other ones: more of them prolong a run.
+        Only the steps may be other ones: more of them prolong a run. What a kill or a full disk
+        left of one that was only being begun is begun anew. No other process may be writing here.
 
         Raises:
             InputError: the folder holds another run, or something else.
@@ -69,10 +72,16 @@ class RunFolder:
         if not (path / _ABOUT).exists():
             if path.is_file():
                 raise InputError(f"{path}: is a file; a folder is needed")
-            if path.is_dir() and any(path.iterdir()):
-                raise InputError(f"{path}: holds something else than a run; name another folder")
             path.mkdir(parents=True, exist_ok=True)
-            song.save(path / _SONG)
+            left = {file.name for file in path.iterdir()} - {*_temporaries(path)}
+            # The song comes first; another one of that name is somebody's.
+            if left and not (
+                left == {_SONG} and _same_song(Demonstration.load(path / _SONG), song)
+            ):
+                raise InputError(f"{path}: holds something else than a run; name another folder")
+            _sweep(path)
+            if not left:
+                song.save(path / _SONG)
             run = cls(path, song, config, start, seconds)
             run._write_about()
             return run
@@ -84,6 +93,7 @@ class RunFolder:
             raise InputError(
                 f"{path}: holds a run with other settings ({odd}); name another folder"
             )
+        _sweep(path)
         run = replace(there, config=config)
         run._write_about()
         return run
@@ -181,19 +191,36 @@ class RunFolder:
             temporary.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
 
+def is_run(path: Path) -> bool:
+    """Whether a folder is that of a run."""
+    return (path / _ABOUT).is_file()
+
+
 def find_runs(path: Path) -> list[Path]:
     """The run in a folder, or the runs with an expert in the folders below it, in order.
 
     Raises:
         InputError: there are none.
     """
-    if (path / _ABOUT).exists():
+    if is_run(path):
         return [path]
     found = sorted(about.parent for about in path.glob(f"*/{_ABOUT}"))
     found = [folder for folder in found if (folder / _BEST).exists()]
     if not found:
         raise InputError(f"{path}: no run, nor a folder of runs with experts")
     return found
+
+
+def _temporaries(path: Path) -> list[str]:
+    """Folders in which `atomic` was writing our files when its process was killed."""
+    ours = "|".join(re.escape(Path(name).stem) for name in (_ABOUT, _SONG, _STATE, _BEST, _CURVE))
+    form = re.compile(rf"\.({ours})-\w+")
+    return [file.name for file in path.iterdir() if form.fullmatch(file.name) and file.is_dir()]
+
+
+def _sweep(path: Path) -> None:
+    for name in _temporaries(path):
+        shutil.rmtree(path / name, ignore_errors=True)
 
 
 def _same_song(one: Demonstration, other: Demonstration) -> bool:

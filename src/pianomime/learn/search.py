@@ -8,14 +8,15 @@ wanted, also those that the plan leaves out for lack of a finger.
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.errors import InputError
 from pianomime.learn.config import SearchConfig
 from pianomime.learn.run_folder import Evaluation, RunFolder
+from pianomime.learn.run_log import RunLog
 from pianomime.learn.song_batch import prior_tracker
 from pianomime.learn.stored_tracker import StoredTracker
 from pianomime.learn.tell import Tell
@@ -25,11 +26,13 @@ from pianomime.track import RolloutConfig, RolloutTracker, Tracker
 from pianomime.video.demonstration import DemonstrationPlanner
 
 
-def search(run: RunFolder, tell: Tell) -> None:
+def search(run: RunFolder, threads: int, tell: Tell) -> None:
     """Search until the run's steps are spent; go on after the last pass that was finished.
 
     Args:
         run: its folder.
+        threads: how many variations step at the same time; 0 for one on each core. It changes
+            nothing but the time that it takes.
         tell: told how far it is.
 
     Raises:
@@ -40,23 +43,23 @@ def search(run: RunFolder, tell: Tell) -> None:
     curve = run.curve()
     ctrl = None if state is None else state[0]["ctrl"]
     steps = run.steps_done
-    while steps < run.config.steps:
-        tracker = _pass(run, ctrl, len(curve))
-        played = _play(run, tracker, steps, curve, tell)
-        steps += tracker.steps + len(played)
-        made = Evaluation(steps, **_scores(played))
-        if made.f1 > max((one.f1 for one in curve), default=-1.0):
-            ctrl = played.ctrl
-            run.keep_best({"ctrl": ctrl}, made)
-        assert ctrl is not None
-        curve.append(made)
-        run.checkpoint({"ctrl": ctrl}, {}, curve)
+    with closing(RunLog(run)) as log:
+        while steps < run.config.steps:
+            tracker = _pass(run, ctrl, len(curve), threads)
+            played = _play(run, tracker, steps, curve, tell)
+            steps += tracker.steps + len(played)
+            made = Evaluation(steps, **_scores(played))
+            if made.f1 > max((one.f1 for one in curve), default=-1.0):
+                ctrl = played.ctrl
+                run.keep_best({"ctrl": ctrl}, made)
+            assert ctrl is not None
+            curve.append(made)
+            run.checkpoint({"ctrl": ctrl}, {}, curve)
+            log.add(made)
 
 
 def pass_config(settings: SearchConfig, number: int, seed: int) -> RolloutConfig:
     """How a pass tries: by turns as `RolloutConfig` does, in larger and in smaller moves."""
-    if min(settings.variations, settings.rounds, settings.commit) < 1:
-        raise InputError("variations, rounds and commit must be 1 or more")
     usual = RolloutConfig()
     size = settings.sizes[number % len(settings.sizes)]
     draws = np.random.SeedSequence([seed, number]).generate_state(1)
@@ -73,10 +76,12 @@ def pass_config(settings: SearchConfig, number: int, seed: int) -> RolloutConfig
     )
 
 
-def _pass(run: RunFolder, ctrl: NDArray[np.float64] | None, number: int) -> RolloutTracker:
+def _pass(
+    run: RunFolder, ctrl: NDArray[np.float64] | None, number: int, threads: int
+) -> RolloutTracker:
     inner: Tracker = prior_tracker(run.config.env) if ctrl is None else StoredTracker(ctrl)
     config = pass_config(run.config.search, number, run.config.seed)
-    return RolloutTracker(inner, config, run.song.score.roll())
+    return RolloutTracker(inner, config, run.song.score.roll(), threads)
 
 
 def _play(

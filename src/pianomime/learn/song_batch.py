@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 from pianomime.learn.config import EnvConfig
 from pianomime.learn.observation import Observer
 from pianomime.learn.reward import frame_reward
-from pianomime.track import BatchTracker, DynamicTracker, IkTracker, Tracker
+from pianomime.track import BatchTracker, DynamicTracker, IkTracker
 from pianomime.video.demonstration import Demonstration
 from pianomime.world import World, WorldBatch
-from pianomime.world.hand import SIDES, Hand
 
 
-def prior_tracker(config: EnvConfig) -> Tracker:
+def prior_tracker(config: EnvConfig) -> BatchTracker:
     """The tracker whose controls are improved."""
     return IkTracker() if config.prior == "ik" else DynamicTracker()
 
@@ -68,8 +67,7 @@ class SongBatch:
         self._plan, self._goal = song.plan, song.score.roll()
         self._pedal = song.score.pedal_roll()
         self._worlds = WorldBatch(envs, threads, quiet=True)
-        self._hands = [Hand(side) for side in SIDES]
-        self._tracker = BatchTracker(prior_tracker(config))
+        self._tracker = prior_tracker(config)
         self._tracker.begin(self._plan)
         self.observer = Observer(config.observation, self._goal, self._plan)
         self._reach = config.action.factor * self.observer.ctrl_range
@@ -99,6 +97,7 @@ class SongBatch:
         if self.config.episode.start == "anywhere":
             frames = draw.integers(0, len(self._plan), len(which))
             self._worlds.set_state(self._reference()[frames], which)
+            self._worlds.pedal[which] = (frames > 0) & self._pedal[frames - 1]
         self.frames[which] = frames
         self._elapsed[which] = 0
         self._f1_sum[which] = 0.0
@@ -109,7 +108,12 @@ class SongBatch:
 
         Args:
             action: (B, actions) -1..1; what lies beyond counts as the end.
+
+        Raises:
+            ValueError: the song is over in an environment that was not reset.
         """
+        if (self.frames == len(self._plan)).any():
+            raise ValueError("the song is over in an environment: reset it first")
         action = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         frames = self.frames
         goal, wanted = self._goal[frames], self._pedal[frames]
@@ -117,7 +121,8 @@ class SongBatch:
         self._worlds.step(self._prior + self._reach * action[:, :46], pedal)
         self.frames = frames + 1
         self._elapsed += 1
-        keys, pressed, tips = self._worlds.key_state, self._worlds.pressed, self._tips(self._all)
+        tips = self._look(self._all)
+        keys, pressed = self._worlds.key_state, self._worlds.pressed
         reward = frame_reward(
             self.config.reward,
             keys,
@@ -133,7 +138,6 @@ class SongBatch:
         terminated = self.frames == len(self._plan)
         most = self.config.episode.frames
         truncated = (self._elapsed == most) & ~terminated if most else np.zeros(len(self), bool)
-        self._look(self._all, tips)
         return Step(
             reward,
             terminated,
@@ -163,11 +167,13 @@ class SongBatch:
         self._f1_sum = state["f1_sum"].copy()
         self._look(self._all)
 
-    def _look(self, which: NDArray[np.int64], tips: NDArray[np.float64] | None = None) -> None:
-        """Ask the prior, and write observations."""
+    def _look(self, which: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Ask the prior, and write observations; the fingertips (n, 2, 5, 3) [m]."""
         frames = self.frames[which]
         last = np.minimum(frames, len(self._plan) - 1)
-        self._prior[which] = self._tracker.control(last, self._worlds, which)
+        prior, points = self._tracker.controls(last, self._worlds.qpos[which])
+        tips = points[:, :, 1:]
+        self._prior[which] = prior
         self.observer.write(
             self.observations,
             which,
@@ -175,17 +181,10 @@ class SongBatch:
             self._worlds.qpos_hands[which],
             self._worlds.qvel_hands[which],
             self._worlds.key_state[which],
-            self._tips(which) if tips is None else tips,
-            self._prior[which],
+            tips,
+            prior,
             self._worlds.pedal[which],
         )
-
-    def _tips(self, which: NDArray[np.int64]) -> NDArray[np.float64]:
-        """(n, 2, 5, 3) [m] fingertips of worlds."""
-        tips = np.empty((len(which), 2, 5, 3))
-        for row, qpos in enumerate(self._worlds.qpos[which]):
-            for index, hand in enumerate(self._hands):
-                tips[row, index] = hand.points(qpos[hand.joints])[1:]
         return tips
 
     def _reference(self) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from pianomime.learn.config import EnvConfig, preset_config
+from pianomime.learn.config_check import check_env
 from pianomime.learn.song import load_song
 from pianomime.learn.song_batch import SongBatch
 from pianomime.video.demonstration import Demonstration
@@ -22,9 +23,14 @@ def make_batch(
     envs: int,
     threads: int = 0,
 ) -> SongBatch:
-    """A batch of what a caller named: a song or its file, a config or the name of a preset."""
+    """A batch of what a caller named: a song or its file, a config or the name of a preset.
+
+    Raises:
+        InputError: one of them cannot be used.
+    """
     song = demonstration if isinstance(demonstration, Demonstration) else load_song(demonstration)
     chosen = preset_config(config).env if isinstance(config, str) else config
+    check_env(chosen)
     return SongBatch(song, chosen, envs, threads)
 
 

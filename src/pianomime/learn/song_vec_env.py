@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from pianomime.learn.song_batch import SongBatch, Step
+from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_env import action_space, observation_space
 
 
@@ -18,7 +18,6 @@ class SongVecEnv(VecEnv):
 
     Attributes:
         batch: the environments.
-        last: what the last step gave.
 
     Args:
         batch: the environments.
@@ -26,7 +25,6 @@ class SongVecEnv(VecEnv):
 
     def __init__(self, batch: SongBatch) -> None:
         self.batch = batch
-        self.last: Step | None = None
         self._resumed = False
         self.render_mode = None
         self._actions = np.zeros((len(batch), batch.actions), np.float32)
@@ -59,7 +57,7 @@ class SongVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Play one frame in every environment."""
-        step = self.last = self.batch.step(self._actions)
+        step = self.batch.step(self._actions)
         done = step.terminated | step.truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = np.flatnonzero(done)

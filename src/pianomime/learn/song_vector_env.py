@@ -47,7 +47,9 @@ class SongVectorEnv(VectorEnv[_Rows, _Rows, NDArray[Any]]):
     ) -> tuple[_Rows, dict[str, Any]]:
         """Begin an episode in every environment."""
         if isinstance(seed, list):
-            seed = seed[0]
+            # One generator draws for all of them.
+            given = [one for one in seed if one is not None]
+            seed = int(np.random.SeedSequence(given).generate_state(1)[0]) if given else None
         super().reset(seed=seed)
         self.batch.reset(self.np_random)
         return self.batch.observations.copy(), {"frame": self.batch.frames.copy()}
@@ -71,7 +73,10 @@ class SongVectorEnv(VectorEnv[_Rows, _Rows, NDArray[Any]]):
             info["final_info"] = {name: info[name].copy() for name in ("frame", "f1", "blow_ups")}
             info["_final_info"] = ended
             self.batch.reset(self.np_random, np.flatnonzero(ended))
+            # What is told now is of the episodes that begin.
             info["frame"] = self.batch.frames.copy()
+            info["f1"] = np.where(ended, 0.0, step.f1)
+            info["blow_ups"] = np.where(ended, 0, step.blow_ups)
         return (
             self.batch.observations.copy(),
             step.reward,

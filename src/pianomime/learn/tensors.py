@@ -28,7 +28,7 @@ def write_tensors(path: Path, arrays: Arrays, about: dict[str, Any]) -> None:
     Raises:
         OSError: the disk is full, or the folder cannot be written; what was there stays.
     """
-    plain = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    plain = {name: np.asarray(array, order="C") for name, array in arrays.items()}
     content = save(plain, {"about": json.dumps(about)})
     with atomic(path) as temporary:
         temporary.write_bytes(content)

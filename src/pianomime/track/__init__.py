@@ -4,7 +4,7 @@ from pianomime.track.batch import BatchTracker
 from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
 from pianomime.track.rollout import RolloutConfig, RolloutTracker
-from pianomime.track.tracker import Tracker
+from pianomime.track.tracker import PedalTracker, Tracker
 
 __all__ = [
     "BatchTracker",
@@ -12,6 +12,7 @@ __all__ = [
     "DynamicTracker",
     "IkConfig",
     "IkTracker",
+    "PedalTracker",
     "RolloutConfig",
     "RolloutTracker",
     "Tracker",

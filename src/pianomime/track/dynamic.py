@@ -94,12 +94,27 @@ class DynamicTracker:
         one: it is lifted above the keys until it has come across. So is an idle finger that
         has sunk between the keys.
         """
+        return self._control(frame, world.qpos)[0]
+
+    def controls(
+        self, frames: NDArray[np.int64], qpos: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As `BatchTracker.controls`: of one world after the other."""
+        ctrl, points = np.empty((len(frames), 46)), np.empty((len(frames), 2, 6, 3))
+        for row, frame in enumerate(frames):
+            ctrl[row], points[row] = self._control(int(frame), qpos[row])
+        return ctrl, points
+
+    def _control(
+        self, frame: int, qpos: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The control (46,) and the points (2, 6, 3) of the hands."""
         ctrl: NDArray[np.float64] = self._feedforward[frame].copy()
-        qpos = world.qpos
+        points = np.empty((2, 6, 3))
         for index, hand in enumerate(self._hands):
             here = qpos[hand.joints]
-            points, jacobian = hand.points_and_jacobian(here)
-            tips, jacobian = points[1:], jacobian[1:]
+            points[index], jacobian = hand.points_and_jacobian(here)
+            tips, jacobian = points[index, 1:], jacobian[1:]
             # A finger corrects itself, and only what pressing fingers have in common is left to
             # the forearm: moving it moves all of them.
             jacobian[..., :_ARM_JOINTS] = 0.0
@@ -115,7 +130,7 @@ class DynamicTracker:
             move += self._lift(jacobian[lift, 2])
             press = self._press[index][frame][~lift].sum(axis=0)
             ctrl[hand.actuators] += hand.to_ctrl @ move + press
-        return ctrl
+        return ctrl, points
 
     def _reach(
         self, jacobian: NDArray[np.float64], error: NDArray[np.float64]

@@ -35,6 +35,9 @@ class IkTracker:
     def __init__(self, config: IkConfig | None = None) -> None:
         self.config = config or IkConfig()
         self._hands = [Hand(side) for side in SIDES]
+        self._low, self._high = (
+            np.array([getattr(hand, end) for hand in self._hands]) for end in ("low", "high")
+        )
         self._targets = np.empty((0, 2, 6, 3))
         tips = np.full((5, 3), self.config.tip_weight)
         self._weights = np.vstack([self.config.wrist_weight, tips])
@@ -45,60 +48,119 @@ class IkTracker:
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) right then left: where one step from the present pose leads [rad, m]."""
-        ctrl = np.empty(world.model.nu)
-        qpos = world.qpos
-        for hand, target in zip(self._hands, self._targets[frame], strict=True):
-            ctrl[hand.actuators] = hand.to_ctrl @ self.step(hand, qpos[hand.joints], target)
+        ctrl: NDArray[np.float64] = self.controls(np.array([frame]), world.qpos[None])[0][0]
         return ctrl
+
+    def controls(
+        self, frames: NDArray[np.int64], qpos: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As `BatchTracker.controls`: of all worlds and both hands in one pass over arrays."""
+        here = np.stack([qpos[:, hand.joints] for hand in self._hands], axis=1)
+        points = np.empty((*here.shape[:2], 6, 3))
+        jacobian = np.empty((*points.shape, here.shape[2]))
+        for index, hand in enumerate(self._hands):
+            for row in range(len(here)):
+                points[row, index], jacobian[row, index] = hand.points_and_jacobian(
+                    here[row, index]
+                )
+        there = self._steps(here, points, jacobian, self._targets[frames], self._low, self._high)
+        ctrl = np.empty((len(here), 46))
+        for index, hand in enumerate(self._hands):
+            ctrl[:, hand.actuators] = (hand.to_ctrl @ there[:, index, :, None])[..., 0]
+        return ctrl, points
 
     def step(
         self, hand: Hand, qpos: NDArray[np.float64], target: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Joint positions (27,) one step from `qpos` toward the targets (6, 3) of the points."""
         points, jacobian = hand.points_and_jacobian(qpos)
-        error = (self._weights * (target - points)).ravel()
-        jacobian = (self._weights[..., None] * jacobian).reshape(error.size, -1)
+        return self._steps(qpos, points, jacobian, target, hand.low, hand.high)
+
+    def _steps(
+        self,
+        qpos: NDArray[np.float64],
+        points: NDArray[np.float64],
+        jacobian: NDArray[np.float64],
+        targets: NDArray[np.float64],
+        low: NDArray[np.float64],
+        high: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """(..., 27) one step on; of points (..., 6, 3) and their Jacobians (..., 6, 3, 27)."""
+        error = (self._weights * (targets - points)).reshape(*points.shape[:-2], -1)
+        weighted = (self._weights[..., None] * jacobian).reshape(*error.shape, -1)
+        square = (error[..., None, :] @ error[..., None])[..., 0, 0]
         # Every point task adds its own damping, proportional to its own squared error.
-        damping = self.config.damping + self.config.lm_damping * float(error @ error)
-        return qpos + bounded_least_squares(
-            jacobian, error, damping, hand.low - qpos, hand.high - qpos
-        )
+        damping = self.config.damping + self.config.lm_damping * square
+        return qpos + bounded_least_squares(weighted, error, damping, low - qpos, high - qpos)
 
 
 def bounded_least_squares(
+    jacobian: NDArray[np.float64],
+    error: NDArray[np.float64],
+    damping: NDArray[np.float64] | float,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The x in [low, high] that minimises `|jacobian x - error|^2 + damping |x|^2`.
+
+    Many such programs are prepared together, and are each, bit for bit, what one alone is. A box
+    with low <= high is never empty, so there always is an answer: where the fast solver gives up
+    on a badly conditioned program, a slower one that cannot does it.
+
+    Args:
+        jacobian: (..., R, J).
+        error: (..., R).
+        damping: (...), or one for all.
+        low: (..., J).
+        high: (..., J).
+
+    Returns:
+        (..., J).
+    """
+    import daqp
+
+    transposed = jacobian.swapaxes(-1, -2)
+    hessian = transposed @ jacobian
+    diagonal = np.einsum("...ii->...i", hessian)  # a view
+    diagonal += np.asarray(damping)[..., None]
+    # Brought to unit diagonal: weights from 1e-12 to 1e4 make it ill conditioned as it stands.
+    scale = 1.0 / np.sqrt(diagonal)
+    hessian *= scale[..., :, None] * scale[..., None, :]
+    gradient = (-transposed @ error[..., None])[..., 0] * scale
+    most, least = high / scale, low / scale
+    x = np.empty_like(scale)
+    none = np.empty((0, x.shape[-1]))
+    for index in np.ndindex(x.shape[:-1]):
+        solution, _, status, _ = daqp.solve(
+            hessian[index],
+            gradient[index],
+            none,
+            most[index],
+            least[index],
+            np.zeros(x.shape[-1], np.int32),
+        )
+        if status == 1:
+            x[index] = solution * scale[index]
+            continue
+        ridge = float(np.broadcast_to(damping, x.shape[:-1])[index])
+        x[index] = _slow_least_squares(
+            jacobian[index], error[index], ridge, low[index], high[index]
+        )
+    within: NDArray[np.float64] = np.clip(x, low, high)
+    return within
+
+
+def _slow_least_squares(
     jacobian: NDArray[np.float64],
     error: NDArray[np.float64],
     damping: float,
     low: NDArray[np.float64],
     high: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The x in [low, high] that minimises `|jacobian x - error|^2 + damping |x|^2`.
-
-    A box with low <= high is never empty, so there always is an answer: where the fast solver
-    gives up on a badly conditioned program, a slower one that cannot does it.
-    """
-    import daqp
-
-    hessian = jacobian.T @ jacobian
-    hessian[np.diag_indices_from(hessian)] += damping
-    gradient = -jacobian.T @ error
-    # Brought to unit diagonal: weights from 1e-12 to 1e4 make it ill conditioned as it stands.
-    scale = 1.0 / np.sqrt(hessian.diagonal())
-    solution, _, status, _ = daqp.solve(
-        hessian * np.outer(scale, scale),
-        gradient * scale,
-        np.empty((0, len(low))),
-        high / scale,
-        low / scale,
-        np.zeros(len(low), np.int32),
-    )
-    if status == 1:
-        within: NDArray[np.float64] = np.clip(solution * scale, low, high)
-        return within
     from scipy.optimize import lsq_linear
 
     rows = np.vstack([jacobian, np.sqrt(damping) * np.eye(len(low))])
     # lsq_linear wants a box with an inside.
     result = lsq_linear(rows, np.r_[error, np.zeros(len(low))], (low, np.maximum(high, low + 1e-9)))
-    inside: NDArray[np.float64] = np.clip(result.x, low, high)
-    return inside
+    x: NDArray[np.float64] = result.x
+    return x

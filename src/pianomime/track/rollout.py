@@ -76,6 +76,7 @@ class RolloutTracker:
         tracker: whose controls to improve.
         config: how hard to try.
         goal: (T, 88) bool, the keys that should be down; those that the plan presses if None.
+        threads: how many variations step at the same time; 0 for one on each core.
     """
 
     def __init__(
@@ -83,10 +84,12 @@ class RolloutTracker:
         tracker: Tracker,
         config: RolloutConfig | None = None,
         goal: NDArray[np.bool_] | None = None,
+        threads: int = 0,
     ) -> None:
         self.config = config or RolloutConfig()
         self.steps = 0
         self._asked = goal
+        self._threads = threads
         self._tracker = tracker
         self._hands = [Hand(side) for side in SIDES]
         self._spread = self._spreads()
@@ -94,7 +97,7 @@ class RolloutTracker:
     def begin(self, plan: FingertipPlan) -> None:
         """Prepare the tracker; draw the same variations for the same plan."""
         self._tracker.begin(plan)
-        self._batch = WorldBatch(self.config.variations, quiet=True)
+        self._batch = WorldBatch(self.config.variations, self._threads, quiet=True)
         self._goal = plan.keys() if self._asked is None else self._asked
         self._finger_key = plan.finger_key
         self._along = plan.fingertips[:, :, 1:, 1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,4 +23,13 @@ class Tracker(Protocol):
         It depends on plan, frame and world alone: a tracker that looks ahead may ask for a frame
         more than once, on copies of the world.
         """
+        ...
+
+
+@runtime_checkable
+class PedalTracker(Tracker, Protocol):
+    """A tracker that works the sustain pedal as well; for all others the score does."""
+
+    def pedal(self, frame: int) -> bool:
+        """Whether the pedal is down in the frame whose control was asked for last."""
         ...
