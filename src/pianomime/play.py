@@ -156,11 +156,12 @@ class Player:
         blow_ups = []
         world = World()
         self.tracker.begin(plan)
+        pedal_tracker = self.tracker if isinstance(self.tracker, PedalTracker) else None
         for frame in range(frames):
             broken = world.blow_ups
             ctrl[frame] = self.tracker.control(frame, world)
-            if isinstance(self.tracker, PedalTracker):
-                pedal[frame] = self.tracker.pedal(frame)
+            if pedal_tracker is not None:
+                pedal[frame] = pedal_tracker.pedal(frame)
             world.step(ctrl[frame], pedal=bool(pedal[frame]))
             qpos[frame], key_state[frame] = world.qpos, world.key_state
             pressed[frame] = world.pressed

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.music import Score
-from pianomime.plan.fingertip_plan import LEFT, RIGHT
+from pianomime.plan.fingertip_plan import FINGER_COUNT, LEFT, RIGHT
 from pianomime.plan.hand_cost import (
-    FINGERS,
     LATE,
     FingeringConfig,
     Fingers,
@@ -76,7 +75,7 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
         ends = np.full(len(keys), onset + 1)
         np.maximum.at(ends, voice, frames[group, 1])
         outer = np.ones(len(keys), bool)
-        outer[FINGERS : len(keys) - FINGERS] = False
+        outer[FINGER_COUNT : len(keys) - FINGER_COUNT] = False
         struck = Struck(int(onset), keys[outer], ends[outer], worth)
         beam, choice = beam.extend(struck, config)
         place = np.where(outer, np.cumsum(outer) - 1, -1)[voice]
@@ -86,11 +85,11 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     for onset, group, place, choice in reversed(history):
         chain.append((int(onset), group, place, *(array[row] for array in choice[1:])))
         row = int(choice.parent[row])
-    sounding = np.full((2, FINGERS), -1)
+    sounding = np.full((2, FINGER_COUNT), -1)
     for onset, group, place, let_go, assignment, early, late in reversed(chain):
         mine = np.where(place >= 0, assignment[place], -1)
         played = group[mine >= 0]
-        hand, finger = np.divmod(mine[mine >= 0], FINGERS)
+        hand, finger = np.divmod(mine[mine >= 0], FINGER_COUNT)
         fingering.hand[played], fingering.finger[played] = hand, finger
         fingering.start[played] = np.minimum(
             onset + late[hand].astype(np.int64), fingering.stop[played]
@@ -133,9 +132,13 @@ class _Beam:
 
     @staticmethod
     def start() -> _Beam:
-        none = np.full((1, 2, FINGERS), -1)
+        none = np.full((1, 2, FINGER_COUNT), -1)
         return _Beam(
-            np.zeros(1), none, none, np.zeros((1, 2, FINGERS), np.int64), np.array([[-0.14, 0.14]])
+            np.zeros(1),
+            none,
+            none,
+            np.zeros((1, 2, FINGER_COUNT), np.int64),
+            np.array([[-0.14, 0.14]]),
         )
 
     def extend(self, struck: Struck, config: FingeringConfig) -> tuple[_Beam, _Choice]:
@@ -151,7 +154,7 @@ class _Beam:
         left, right = hands
         # (P, M): who plays each note.
         mine, other = options[LEFT][pairs[:, LEFT]], options[RIGHT][pairs[:, RIGHT]]
-        assigned = np.where(mine >= 0, mine, np.where(other >= 0, other + FINGERS, -1))
+        assigned = np.where(mine >= 0, mine, np.where(other >= 0, other + FINGER_COUNT, -1))
         left_out = config.drop * struck.unit + struck.lost(struck.onset, struck.ends)
         apart = right.centre[:, pairs[:, RIGHT]] - left.centre[:, pairs[:, LEFT]]
         total = self.cost[:, None] + (assigned < 0) @ left_out
@@ -174,7 +177,7 @@ class _Beam:
         key, since, until = self.key[parent], self.since[parent], self.until[parent]
         until = np.where(let_go, np.minimum(until, struck.onset - early[..., None]), until)
         row, note = np.nonzero(assignment >= 0)
-        hand, finger = np.divmod(assignment[row, note], FINGERS)
+        hand, finger = np.divmod(assignment[row, note], FINGER_COUNT)
         key[row, hand, finger] = struck.keys[note]
         since[row, hand, finger] = struck.onset + late[row, hand]
         until[row, hand, finger] = struck.ends[note]
@@ -201,7 +204,7 @@ def _options_in_reach(
 
 def _strikes(options: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.int64]:
     """(O, 5) the key that each finger is to strike in options (O, M) for M keys; `KEYS`: none."""
-    strikes = np.full((len(options), FINGERS), KEYS)
+    strikes = np.full((len(options), FINGER_COUNT), KEYS)
     option, note = np.nonzero(options >= 0)
     strikes[option, options[option, note]] = keys[note]
     return strikes
@@ -223,12 +226,12 @@ def _options(notes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     fewest = max(0, notes - _MOST_DROPPED.get(notes, notes))
     for played in sorted({*range(min(notes, 2) + 1), *range(fewest, notes + 1)}):
         for which in combinations(range(notes), played):
-            for places in combinations(range(2 * FINGERS), played):
+            for places in combinations(range(2 * FINGER_COUNT), played):
                 mine = np.full((2, notes), -1)
                 for note, place in zip(which, places, strict=True):
-                    if place < FINGERS:
+                    if place < FINGER_COUNT:
                         mine[LEFT, note] = left[place]
                     else:
-                        mine[RIGHT, note] = place - FINGERS
+                        mine[RIGHT, note] = place - FINGER_COUNT
                 pairs.append([rows.setdefault(tuple(half), len(rows)) for half in mine])
     return np.array(list(rows), np.int64).reshape(-1, notes), np.array(pairs)

@@ -15,6 +15,7 @@ LEFT, RIGHT = 0, 1
 
 POINTS = ("forearm", "thumb", "index", "middle", "ring", "little")
 FINGERS = POINTS[1:]
+FINGER_COUNT = len(FINGERS)
 NO_KEY = -1
 
 

@@ -14,11 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.plan.fingertip_plan import RIGHT
+from pianomime.plan.fingertip_plan import FINGER_COUNT, RIGHT
 from pianomime.plan.reach import EASE, stretch
 from pianomime.world.figures import BLACK, CONTROL_DT, KEYS, key_centres
 
-FINGERS = 5
 # [m] A finger that goes to another key, up and down again.
 _LIFT = 0.01
 EARLY, LATE = 4, 5
@@ -105,7 +104,7 @@ def chord_cost(
     """
     pair = pair_cost(side, config.strain, config.stretch)
     cost = np.zeros(len(strikes))
-    for low, high in combinations(range(FINGERS), 2):
+    for low, high in combinations(range(FINGER_COUNT), 2):
         cost += pair[low, high][strikes[:, low], strikes[:, high]]
     return cost
 
@@ -182,8 +181,8 @@ def _holding_cost(
 ) -> NDArray[np.float64]:
     """(B, O, 5) cost [key-frames] of each finger holding its key (B, 5) while others strike."""
     pair = pair_cost(side, config.strain, config.stretch)
-    cost = np.zeros((len(holds), len(strikes), FINGERS))
-    for finger, other in permutations(range(FINGERS), 2):
+    cost = np.zeros((len(holds), len(strikes), FINGER_COUNT))
+    for finger, other in permutations(range(FINGER_COUNT), 2):
         cost[..., finger] += pair[other, finger][strikes[:, other], holds[:, None, finger]]
     return cost
 

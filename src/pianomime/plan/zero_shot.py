@@ -48,10 +48,7 @@ class ZeroShotPlanner:
 
     def plan(self, score: Score) -> FingertipPlan:
         """One row for each frame of `score.roll()`."""
-        return self.plan_fingering(score, find_fingering(score, self.config.fingering))
-
-    def plan_fingering(self, score: Score, fingering: Fingering) -> FingertipPlan:
-        """The plan of somebody's fingering: one row for each frame of `score.roll()`."""
+        fingering = find_fingering(score, self.config.fingering)
         finger_key = finger_keys(score, fingering)
         fingertips = np.empty((len(finger_key), 2, 6, 3))
         for index, side in enumerate(SIDES):
