@@ -9,14 +9,10 @@ environment. Ours is the `paper` preset with its inverse kinematics, which the p
 
 from __future__ import annotations
 
-import json
-import os
 import statistics
-import subprocess
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,46 +22,19 @@ from pianomime.learn.ppo import make_model
 from pianomime.learn.song import load_song
 from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_vec_env import SongVecEnv
+from robopianist_peer import RobopianistPeer
 
 
-class Peer:
-    """RoboPianist and Stable-Baselines3 in a process of their own, idle unless asked."""
+class Peer(RobopianistPeer):
+    """RoboPianist and Stable-Baselines3."""
 
     def __init__(self, python: Path, *arguments: int) -> None:
-        self._process = subprocess.Popen(
-            [
-                str(python),
-                str(Path(__file__).with_name("robopianist_sb3.py")),
-                *map(str, arguments),
-            ],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "MUJOCO_GL": "disable", "PYTHONWARNINGS": "ignore"},
-        )
-        self.facts = self._answer()
+        super().__init__(python, "robopianist_sb3.py", *map(str, arguments))
 
     def rate(self, mode: str) -> float:
         """Steps a second in a mode."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps({"mode": mode}) + "\n")
-        self._process.stdin.flush()
-        answer = self._answer()
+        answer = self.ask(mode)
         return float(answer["steps"] / answer["seconds"])
-
-    def close(self) -> None:
-        """End the process."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
-
-    def _answer(self) -> dict[str, Any]:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            raise SystemExit("RoboPianist's process ended; its error is above")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
 
 
 class Ours:

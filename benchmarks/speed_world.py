@@ -21,10 +21,8 @@ contacts are counted on both sides, to show that both do the same work.
 
 from __future__ import annotations
 
-import json
 import os
 import statistics
-import subprocess
 import tempfile
 import time
 from collections.abc import Callable
@@ -39,6 +37,7 @@ import common
 import workload
 from pianomime.world import World, WorldBatch
 from pianomime.world.figures import CONTROL_DT
+from robopianist_peer import RobopianistPeer
 
 _BATCH_APPROACH = 20
 _BATCH_SHORTER = 4
@@ -49,52 +48,23 @@ class LeftOutError(Exception):
     """A workload cannot be run here; the message says why."""
 
 
-class Peer:
-    """RoboPianist in a process of its own, idle unless asked."""
+class Peer(RobopianistPeer):
+    """RoboPianist, given the same controls."""
 
     def __init__(self, python: Path, controls: Controls, extra: list[str]) -> None:
         self._folder = tempfile.TemporaryDirectory()
         file = Path(self._folder.name, "controls.npy")
         np.save(file, controls)
-        worker = Path(__file__).with_name("robopianist_worker.py")
-        self._process = subprocess.Popen(
-            [str(python), str(worker), str(file), *extra],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "MUJOCO_GL": "disable", "PYTHONWARNINGS": "ignore"},
-        )
-        self.facts = self._answer()
-
-    def ask(self, mode: str) -> dict[str, Any]:
-        """Have it run all controls in a mode, and wait for what it says."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(json.dumps({"mode": mode}) + "\n")
-        self._process.stdin.flush()
-        return self._answer()
+        super().__init__(python, "robopianist_worker.py", str(file), *extra)
 
     def time(self, mode: str) -> float:
         """Seconds that all controls take in a mode."""
         return float(self.ask(mode)["seconds"])
 
-    def pin(self, core: int) -> None:
-        """Keep it on one core."""
-        os.sched_setaffinity(self._process.pid, {core})
-
     def close(self) -> None:
         """End the process."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
+        super().close()
         self._folder.cleanup()
-
-    def _answer(self) -> dict[str, Any]:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            raise RuntimeError("RoboPianist's process ended; its error is above")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
 
 
 def run_world(controls: Controls, read: bool) -> float:

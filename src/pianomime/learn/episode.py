@@ -88,6 +88,7 @@ def play_episode(run: RunFolder) -> Episode:
     tracker.begin(plan)
     prior.begin(plan)
     columns = _empty(len(plan))
+    pedal_tracker = tracker if isinstance(tracker, PedalTracker) else None
     for frame in range(len(plan)):
         columns["joints"][frame] = world.qpos_hands
         columns["velocities"][frame] = world.qvel_hands
@@ -95,8 +96,8 @@ def play_episode(run: RunFolder) -> Episode:
         columns["prior"][frame] = prior.control(frame, world)
         ctrl = tracker.control(frame, world)
         columns["action"][frame] = ctrl
-        if isinstance(tracker, PedalTracker):
-            pedal[frame] = tracker.pedal(frame)
+        if pedal_tracker is not None:
+            pedal[frame] = pedal_tracker.pedal(frame)
         world.step(ctrl, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
     _fill(columns, goal, plan.fingertips, plan.finger_key)
