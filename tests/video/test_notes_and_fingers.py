@@ -8,6 +8,7 @@ from pianomime.music import Score, onset_f1
 from pianomime.plan import NO_KEY
 from pianomime.video.align import align
 from pianomime.video.hand_tracks import HandTracks
+from pianomime.video.light_record import LightRecord
 from pianomime.video.midi_offset import estimate_offset
 from pianomime.video.note_fingers import find_note_fingers
 from pianomime.video.note_reading import read_notes
@@ -50,8 +51,18 @@ def lamps(score, frames, spill=0.6, late=0):
     return np.clip(light, 0, 255).astype(np.uint8)
 
 
+def notes_read(light, *about):
+    with LightRecord.of(light) as record:
+        return read_notes(record, *about)
+
+
+def offset_of(score, tracks, light):
+    with LightRecord.of(light) as record:
+        return estimate_offset(score, tracks, record)
+
+
 def test_notes_are_read_off_light_that_spills(score, points):
-    read = read_notes(lamps(score, len(points)), tracks(points), "read")
+    read = notes_read(lamps(score, len(points)), tracks(points), "read")
     assert onset_f1((score.key, score.onset), (read.score.key, read.score.onset), 0.1) > 0.97
     assert read.touched > 0.9
     assert read.lit
@@ -65,7 +76,7 @@ def test_a_key_that_is_down_most_of_the_time_is_read(score, points):
     holding[:, 0, 5] = key_centres()[4, :2]
     holding[24:, 0, 5] = key_centres()[10, :2]
     light = np.maximum(lamps(score, len(points)), lamps(held, len(points), 0.0))
-    read = read_notes(light, tracks(holding), "read").score
+    read = notes_read(light, tracks(holding), "read").score
     assert read.onset[read.key == 10] == pytest.approx([1.2], abs=0.051)
 
 
@@ -75,7 +86,7 @@ def test_notes_are_read_off_keys_that_go_down(score, points):
     for key, onset, offset in zip(score.key, score.onset, score.offset, strict=True):
         light[int(onset * 20) : int(np.ceil(offset * 20)), 2, key] -= 40
     light[40:50, 2, 70] -= 40
-    read = read_notes(light, tracks(points), "read")
+    read = notes_read(light, tracks(points), "read")
     assert onset_f1((score.key, score.onset), (read.score.key, read.score.onset), 0.1) > 0.95
     assert not read.lit
     assert 70 not in read.score.key
@@ -83,7 +94,7 @@ def test_notes_are_read_off_keys_that_go_down(score, points):
 
 def test_nothing_is_read_off_noise(points):
     light = np.random.default_rng(0).integers(38, 42, (len(points), 3, 88, 3)).astype(np.uint8)
-    read = read_notes(light, tracks(points), "noise")
+    read = notes_read(light, tracks(points), "noise")
     assert len(read.score) < 5 or read.touched < 0.7
 
 
@@ -99,11 +110,11 @@ def test_offset_from_fingers_and_light(score, points, late):
         moved = Score(score.key, score.onset + late, score.offset + late, score.velocity)
         light = lamps(moved, len(seen))
     dark = np.full_like(light, DARK)
-    by_fingers = estimate_offset(score, tracks(seen), dark)
+    by_fingers = offset_of(score, tracks(seen), dark)
     # Fingers are over their keys for a while before and after.
     assert by_fingers.seconds == pytest.approx(late, abs=0.3)
     assert by_fingers.matches
-    assert estimate_offset(score, tracks(seen), light).seconds == pytest.approx(late, abs=0.051)
+    assert offset_of(score, tracks(seen), light).seconds == pytest.approx(late, abs=0.051)
 
 
 def test_a_repeat_is_not_taken_for_the_beginning():
@@ -119,7 +130,7 @@ def test_a_repeat_is_not_taken_for_the_beginning():
     second = points[100:]
     second += np.random.default_rng(0).normal(0, 0.007, second.shape)
     dark = np.full((len(points), 3, 88, 3), DARK, np.uint8)
-    assert estimate_offset(score, tracks(points), dark).seconds == pytest.approx(0, abs=0.3)
+    assert offset_of(score, tracks(points), dark).seconds == pytest.approx(0, abs=0.3)
 
 
 def test_another_song_does_not_match(points):
@@ -127,7 +138,7 @@ def test_another_song_does_not_match(points):
     onset = np.sort(draw.uniform(0, 7, 60))
     other = Score(draw.integers(10, 70, 60), onset, onset + 0.2, np.full(60, 80))
     dark = np.full((len(points), 3, 88, 3), DARK, np.uint8)
-    assert not estimate_offset(other, tracks(points), dark).matches
+    assert not offset_of(other, tracks(points), dark).matches
 
 
 def test_fingers_are_those_that_were_there(score, plan, points):

@@ -15,6 +15,7 @@ from pianomime.plan import NO_KEY
 from pianomime.video import retarget as room
 from pianomime.video.demonstration import Demonstration
 from pianomime.video.film import Film
+from pianomime.video.light_record import LightRecord
 from pianomime.video.retarget import RetargetConfig, retarget
 
 SIZE = (640, 360)
@@ -145,7 +146,8 @@ def test_too_long_a_video_that_does_not_say_so(video, hands, monkeypatch):
 def test_a_keyboard_whose_far_end_is_cut_off(video):
     light = np.full((40, 3, 88, 3), 90, np.uint8)
     light[:, 1] = 0
-    assert room._hidden(light) == []
+    with LightRecord.of(light) as record:
+        assert room._hidden(record) == []
 
 
 def test_another_song_is_noticed(video, hands, tmp_path, score):

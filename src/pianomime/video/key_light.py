@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.video.hand_tracks import HandTracks
+from pianomime.video.light_record import LightRecord
 from pianomime.video.plane import Plane
 from pianomime.video.touch import touching
 from pianomime.world.figures import BLACK, KEYS, key_centres
@@ -72,20 +73,21 @@ class Glow:
     """
 
     def __init__(
-        self, light: NDArray[np.uint8], away: NDArray[np.bool_], zone: int, colourful: bool
+        self, light: LightRecord, away: NDArray[np.bool_], zone: int, colourful: bool
     ) -> None:
         """Find out what is usual.
 
         Args:
-            light: (T, zones, 88, 3), what `KeyLight.read` gives for each frame.
+            light: what `KeyLight.read` gives for each frame.
             away: what `unattended` tells of the same frames.
             zone: which of `ZONES`.
             colourful: go by how colourful a patch is, rather than by any change of colour.
         """
-        self._light = light[:, zone]
+        self._light = light
+        self._zone = zone
         self._colourful = colourful
         # Some frames will do to know what is usual, and what is strong.
-        some = self._light[:: _step(len(light))]
+        some = light.every(_step(len(light)), zone)
         self._usual = np.asarray(np.median(some, axis=0), np.float32)
         # A key may be down for most of the film: at rest it is when no finger is near it.
         for key in range(KEYS):
@@ -98,7 +100,8 @@ class Glow:
         """(T,) about 0..1."""
         if not 0 <= key < KEYS:
             return np.zeros(len(self._light), np.float32)
-        return self._change(self._light[:, key], self._usual[key]) / np.float32(self._strong)
+        light = self._light.key(self._zone, key)
+        return self._change(light, self._usual[key]) / np.float32(self._strong)
 
     def standing_out(self, key: int, share: float = 0.5) -> NDArray[np.float32]:
         """(T,) glow less a share of the brighter neighbour's, for light spreads to neighbours."""

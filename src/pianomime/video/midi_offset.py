@@ -14,6 +14,7 @@ from scipy.signal import fftconvolve
 from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
 from pianomime.video.key_light import LIT, Glow, unattended
+from pianomime.video.light_record import LightRecord
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -44,14 +45,14 @@ class Offset:
 
 
 def estimate_offset(
-    score: Score, tracks: HandTracks, light: NDArray[np.uint8], given: float | None = None
+    score: Score, tracks: HandTracks, light: LightRecord, given: float | None = None
 ) -> Offset:
     """Find the offset at which the score fits the video best.
 
     Args:
         score: of the MIDI file.
         tracks: the hands.
-        light: (T, zones, 88, 3), see `KeyLight`.
+        light: of each frame, see `KeyLight`.
         given: the offset, if it is known: then only how well it fits is found out.
     """
     points, away = tracks.seen_points(), unattended(tracks)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
 from pianomime.video.key_light import LIT, ZONES, Glow, unattended
+from pianomime.video.light_record import LightRecord
 from pianomime.video.stretches import RATE
 from pianomime.video.touch import touching
 
@@ -41,14 +42,14 @@ class ReadNotes(NamedTuple):
     lit: bool
 
 
-def read_notes(light: NDArray[np.uint8], tracks: HandTracks, title: str) -> ReadNotes:
+def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
     """Find the notes that agree best with the fingers.
 
     The places where a note may show, and how strong a sign is asked for, are those that give the
     most notes under a finger and the fewest that no finger can have played.
 
     Args:
-        light: (T, zones, 88, 3), see `KeyLight`.
+        light: of each frame, see `KeyLight`.
         tracks: the hands.
         title: of the score.
     """

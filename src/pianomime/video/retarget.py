@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.music import KEYS, Score
+from pianomime.music import Score
 from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import LEFT, RIGHT
 from pianomime.video.align import Rule, align
@@ -23,6 +24,7 @@ from pianomime.video.hand_model import find_hand_model
 from pianomime.video.hand_tracks import HandTracks, follow, poorly_seen
 from pianomime.video.key_light import ZONES, KeyLight
 from pianomime.video.keyboard import find_keyboards, key_name
+from pianomime.video.light_record import LightRecord
 from pianomime.video.midi_offset import Offset, estimate_offset
 from pianomime.video.note_fingers import NoteFingers, find_note_fingers
 from pianomime.video.note_reading import read_notes
@@ -120,25 +122,28 @@ def retarget(
         seen = named.describe()
         planes = [named.plane.zoomed(1 / film.zoom)]
         ways = []
-    watched = _watch(film, planes, model, tell)
-    tell("notes", 0, 0)
-    best, tracks, offset = _best_way(watched, planes, score, config.offset)
-    plane, light = planes[best], watched.light[best]
-    if ways:
-        seen = ways[best].describe()
-        if len(ways) > 1 and offset is None:
-            lowest = key_name(int(np.flatnonzero(ways[best].seen)[0]))
-            remarks.append(
-                f"the video does not tell the octave: the lowest key seen is taken for {lowest} "
-                "(a MIDI file would tell)"
-            )
-    _check_hands(video, tracks, remarks)
-    remarks += _hidden(light)
-    if len(tracks) == _MOST_FRAMES:
-        remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
-    score, facts = _score(film, score, offset, tracks, light, config, remarks)
-    # Of hours of video it is what takes most memory.
-    del watched, light
+    size = (round(film.width / film.zoom), round(film.height / film.zoom))
+    with ExitStack() as records:
+        lights = [records.enter_context(LightRecord(len(ZONES))) for _ in planes]
+        readers = [KeyLight(plane, size) for plane in planes]
+        sightings = _watch(film, readers, lights, model, tell)
+        tell("notes", 0, 0)
+        best, tracks, offset = _best_way(sightings, size, planes, lights, score, config.offset)
+        plane, light = planes[best], lights[best]
+        if ways:
+            seen = ways[best].describe()
+            if len(ways) > 1 and offset is None:
+                lowest = key_name(int(np.flatnonzero(ways[best].seen)[0]))
+                remarks.append(
+                    f"the video does not tell the octave: the lowest key seen is taken for {lowest}"
+                    " (a MIDI file would tell)"
+                )
+        _check_hands(video, tracks, remarks)
+        remarks += _hidden(light)
+        if len(tracks) == _MOST_FRAMES:
+            remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
+        score, facts = _score(film, score, offset, tracks, light, config, remarks)
+    del sightings
     frames = score.frames()
     points = _rows(tracks.points, frames)
     fingers = find_note_fingers(score, points, tracks.seen)
@@ -185,50 +190,36 @@ def _background(film: Film) -> NDArray[np.float32]:
     return np.asarray(np.median(grey, axis=0) / 255, np.float32)
 
 
-@dataclass(frozen=True, eq=False)
-class _Watched:
-    """What one pass over the film gave.
-
-    Attributes:
-        sightings: hands in each frame.
-        light: for each plane, (T, zones, 88, 3), see `KeyLight`.
-        size: width and height of the pictures [pixels].
-    """
-
-    sightings: Sightings
-    light: list[NDArray[np.uint8]]
-    size: tuple[int, int]
-
-
-def _watch(film: Film, planes: list[Plane], model: Path, tell: Tell) -> _Watched:
-    size = (round(film.width / film.zoom), round(film.height / film.zoom))
-    readers = [KeyLight(plane, size) for plane in planes]
+def _watch(
+    film: Film, readers: list[KeyLight], lights: list[LightRecord], model: Path, tell: Tell
+) -> Sightings:
+    """In one pass over the film find the hands in each frame, and fill the records."""
     sightings = Sightings()
-    # Bytes grow in place; a list of arrays would take twice as much, and as much again at its end.
-    light = [bytearray() for _ in planes]
     total = round(film.seconds * RATE)
     with HandDetector(model) as detector:
         for number, frame in enumerate(islice(film.frames(RATE), _MOST_FRAMES)):
             sightings.append(detector.detect(frame.picture, round(number * 1000 / RATE)))
-            for reader, kept in zip(readers, light, strict=True):
-                kept += reader.read(frame.picture).tobytes()
+            for reader, light in zip(readers, lights, strict=True):
+                light.append(reader.read(frame.picture))
             tell("hands", number + 1, max(total, number + 1))
-    shape = (len(sightings), len(ZONES), KEYS, 3)
-    return _Watched(
-        sightings, [np.frombuffer(kept, np.uint8).reshape(shape) for kept in light], size
-    )
+    return sightings
 
 
 def _best_way(
-    watched: _Watched, planes: list[Plane], score: Score | None, given: float | None
+    sightings: Sightings,
+    size: tuple[int, int],
+    planes: list[Plane],
+    lights: list[LightRecord],
+    score: Score | None,
+    given: float | None,
 ) -> tuple[int, HandTracks, Offset | None]:
     """The plane under which the notes of the score, if there is one, are most under fingers."""
     best: tuple[int, HandTracks, Offset | None] | None = None
-    for number, plane in enumerate(planes):
-        tracks = follow(watched.sightings, watched.size, plane)
+    for number, (plane, light) in enumerate(zip(planes, lights, strict=True)):
+        tracks = follow(sightings, size, plane)
         if score is None:
             return number, tracks, None
-        offset = estimate_offset(score, tracks, watched.light[number], given)
+        offset = estimate_offset(score, tracks, light, given)
         if best is None or best[2] is None or offset.touched > best[2].touched + 0.02:
             best = number, tracks, offset
     assert best is not None
@@ -243,23 +234,22 @@ def _check_hands(video: Path, tracks: HandTracks, remarks: list[str]) -> None:
             remarks.append(f"only one hand is seen: the {name} one is made up, at rest")
 
 
-def _hidden(light: NDArray[np.uint8]) -> list[str]:
+def _hidden(light: LightRecord) -> list[str]:
     """Remarks on when the keyboard does not look like itself: after a cut, or a move."""
-    far_end = light[:, list(ZONES).index("far end")]
-    usual = np.median(far_end[:: max(1, len(light) // 2000)].mean(axis=2), axis=0)
+    far_end = list(ZONES).index("far end")
+    usual = np.median(light.every(max(1, len(light) // 2000), far_end).mean(axis=2), axis=0)
     usual = usual - usual.mean()
     if not usual.any():
         return []  # none of it is within the picture
-    likeness = np.empty(len(light))
-    # In blocks: hours at once take much memory.
-    for first in range(0, len(light), 10_000):
-        level = far_end[first : first + 10_000].mean(axis=2)
+    likeness = []
+    for block in light.blocks(far_end):
+        level = block.mean(axis=2)
         level = level - level.mean(axis=1, keepdims=True)
         scale = np.linalg.norm(level, axis=1) * np.linalg.norm(usual) + 1e-9
-        likeness[first : first + 10_000] = level @ usual / scale
+        likeness.append(level @ usual / scale)
     return [
         f"the keyboard is not where it was, or hidden, from {first:.1f} s to {end:.1f} s"
-        for first, end in stretches(likeness < 0.5)
+        for first, end in stretches(np.concatenate(likeness) < 0.5)
     ]
 
 
@@ -268,7 +258,7 @@ def _score(
     score: Score | None,
     offset: Offset | None,
     tracks: HandTracks,
-    light: NDArray[np.uint8],
+    light: LightRecord,
     config: RetargetConfig,
     remarks: list[str],
 ) -> tuple[Score, dict[str, Any]]:
