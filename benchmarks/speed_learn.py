@@ -41,15 +41,12 @@ class Ours:
     """The `paper` preset on a bundled song."""
 
     def __init__(self, song: str, envs: int, steps: int, ppo: PpoConfig) -> None:
-        import torch
-
-        torch.set_num_threads(len(common.cores()))
         config = replace(preset_config("paper"), ppo=ppo)
         self._vec = SongVecEnv(SongBatch(load_song(song), config.env, envs))
         self._vec.reset()
         draw = np.random.default_rng(0)
         self._actions = draw.uniform(-1, 1, (steps, envs, 46)).astype(np.float32) * 0.1
-        self._model = make_model(self._vec, ppo, 0)
+        self._model = make_model(self._vec, ppo, 0, len(common.cores()))
         self._update = ppo.steps_per_update
         self.facts = {"observations": self._vec.batch.observer.size, "actions": 46}
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -45,33 +47,77 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
     """
     settings = run.config.ppo
     env = SongVecEnv(SongBatch(run.song, run.config.env, settings.envs, threads))
-    model = make_model(env, settings, run.config.seed)
+    model = make_model(env, settings, run.config.seed, threads)
     model.set_logger(configure(str(run.tensorboard), ["tensorboard"]))
-    before = torch.get_num_threads()
-    boundary = _Boundary(run, env, threads or before, tell)
+    boundary = _Boundary(run, env, tell)
     boundary.init_callback(model)
     state = run.state()
     if state is not None:
         boundary.resume(*state)
-    left = run.config.steps - model.num_timesteps
+    # Steps that were taken before are added to those that it is told.
+    model.learn(
+        run.config.steps - model.num_timesteps,
+        callback=boundary,
+        reset_num_timesteps=state is None,
+    )
+    boundary.between_updates()
+
+
+class _Ppo(PPO):
+    """PPO that leaves the cores to whoever needs them.
+
+    Attributes:
+        threads: of the networks in updates.
+    """
+
+    threads: int
+
+    def collect_rollouts(self, *arguments: Any, **named: Any) -> bool:
+        """Play. Threads of networks that wait for the next pass would keep cores from physics."""
+        with _torch_threads(1):
+            return super().collect_rollouts(*arguments, **named)
+
+    def train(self) -> None:
+        """Learn, with the products of matrices in bfloat16 (sums in float32) where that is faster.
+
+        They are most of an update.
+        """
+        precision = torch.get_float32_matmul_precision()
+        torch.set_float32_matmul_precision("medium")
+        try:
+            with _torch_threads(self.threads):
+                super().train()
+        finally:
+            torch.set_float32_matmul_precision(precision)
+
+
+@contextmanager
+def _torch_threads(threads: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads)
     try:
-        # Steps that were taken before are added to those that it is told.
-        model.learn(left, callback=boundary, reset_num_timesteps=state is None)
-        boundary.between_updates()
+        yield
     finally:
         torch.set_num_threads(before)
 
 
-def make_model(env: SongVecEnv, settings: PpoConfig, seed: int) -> PPO:
-    """Stable-Baselines3's PPO with these settings, untrained."""
+def make_model(env: SongVecEnv, settings: PpoConfig, seed: int, threads: int = 0) -> PPO:
+    """Stable-Baselines3's PPO with these settings, untrained.
+
+    Args:
+        env: to learn in.
+        settings: how.
+        seed: of all that is drawn.
+        threads: of the networks in updates; 0 for as many as torch would take.
+    """
     hidden = list(settings.hidden)
 
     def learning_rate(_: float) -> float:
         update = max(model.num_timesteps // settings.steps_per_update - 1, 0)
         return settings.learning_rate * settings.decay**update
 
-    model: PPO
-    model = PPO(
+    model: _Ppo
+    model = _Ppo(
         "MlpPolicy",
         env,
         learning_rate=settings.learning_rate,
@@ -94,15 +140,16 @@ def make_model(env: SongVecEnv, settings: PpoConfig, seed: int) -> PPO:
         device="cpu",
     )
     model.lr_schedule = learning_rate
+    model.threads = threads or torch.get_num_threads()
     return model
 
 
 class _Boundary(BaseCallback):
     """What happens between updates: evaluate, keep the best, write a checkpoint, seed anew."""
 
-    def __init__(self, run: RunFolder, env: SongVecEnv, threads: int, tell: Tell) -> None:
+    def __init__(self, run: RunFolder, env: SongVecEnv, tell: Tell) -> None:
         super().__init__()
-        self._run, self._env, self._threads, self._tell = run, env, threads, tell
+        self._run, self._env, self._tell = run, env, tell
         self._curve: list[Evaluation] = []
         self._fresh = True
 
@@ -130,9 +177,6 @@ class _Boundary(BaseCallback):
 
     def between_updates(self) -> None:
         """Evaluate and write what has been learned; begin the next update the same each time."""
-        # Passes forward gain nothing from more, and threads that wait for the next one keep cores
-        # from the physics.
-        torch.set_num_threads(1)
         steps = self.model.num_timesteps
         update = steps // self._run.config.ppo.steps_per_update
         # A checkpoint that was just read needs not be written again.
@@ -152,9 +196,6 @@ class _Boundary(BaseCallback):
     def _on_rollout_start(self) -> None:
         self.between_updates()
 
-    def _on_rollout_end(self) -> None:
-        torch.set_num_threads(self._threads)
-
     def _on_step(self) -> bool:
         best = max((one.f1 for one in self._curve), default=0.0)
         now = self._curve[-1].f1 if self._curve else 0.0
@@ -166,7 +207,8 @@ class _Boundary(BaseCallback):
         weights = _actor_arrays(self.model)
         tracker = PolicyTracker.from_arrays(self._run.song, self._run.config, weights)
         player = Player("expert", DemonstrationPlanner(self._run.song), tracker)
-        metrics = player.play(self._run.song.score).metrics()
+        with _torch_threads(1):
+            metrics = player.play(self._run.song.score).metrics()
         made = Evaluation(steps, metrics["precision"], metrics["recall"], metrics["f1"])
         if made.f1 > max((one.f1 for one in self._curve), default=-1.0):
             self._run.keep_best(weights, made)
