@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pianomime.errors import InputError
+from pianomime.generalist.methods import METHODS, make_generalist
 from pianomime.music import Score
 from pianomime.performance import Performance
 from pianomime.plan import Planner, ZeroShotPlanner
@@ -192,9 +193,18 @@ def _zero_shot_ik(_: int) -> Player:
     return Player("zero-shot-ik", ZeroShotPlanner(), IkTracker())
 
 
+def _generalist(method: str) -> Callable[[int], Player]:
+    def make(effort: int) -> Player:
+        both = make_generalist(method, effort)
+        return Player(method, both, both, effort)
+
+    return make
+
+
 PLAYERS: dict[str, Callable[[int], Player]] = {
     "zero-shot": _zero_shot,
     "zero-shot-ik": _zero_shot_ik,
+    **{method: _generalist(method) for method in METHODS},
 }
 """Every player by name, given the effort.
 

@@ -32,12 +32,16 @@ class Episode:
         f1: frame-wise, of the whole.
         prior_name: the tracker that proposed `prior`, "ik" or "dynamic".
         columns: arrays by the names in `COLUMNS`.
+        song: number that episodes of one song share; -1 where nobody knows.
+        split: part of the data set that it belongs to; only "train" is for training.
     """
 
     name: str
     f1: float
     prior_name: str
     columns: dict[str, NDArray[Any]]
+    song: int = -1
+    split: str = "train"
 
 
 @dataclass(frozen=True)
@@ -111,13 +115,15 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
     Args:
         experts: .npz with clip_id, length, qpos_1e4, qvel_500, key_state_255 and ctrl_1e4.
         demonstrations: .npz with clip_id, length, fingertips, finger_key and goal_packed of the
-            same clips, and more.
+            same clips, and more; where it has song_group and split, they are kept.
 
     Raises:
         InputError: the files are not what they should be.
     """
     recorded = _arrays(experts, "clip_id length qpos_1e4 qvel_500 key_state_255 ctrl_1e4")
-    human = _arrays(demonstrations, "clip_id length fingertips finger_key goal_packed")
+    human = _arrays(
+        demonstrations, "clip_id length fingertips finger_key goal_packed", "song_group split"
+    )
     for path, arrays, column in (
         (experts, recorded, "ctrl_1e4"),
         (demonstrations, human, "goal_packed"),
@@ -125,6 +131,11 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         fits = arrays["length"].shape == arrays["clip_id"].shape
         if not fits or arrays["length"].sum() != len(arrays[column]):
             raise InputError(f"{path}: the lengths of the clips do not add up")
+    clips = human["clip_id"].tolist()
+    songs = dict(zip(clips, human.get("song_group", np.full(len(clips), -1)).tolist(), strict=True))
+    splits = dict(
+        zip(clips, human.get("split", np.full(len(clips), "train")).tolist(), strict=True)
+    )
     human_ends = dict(zip(human["clip_id"].tolist(), np.cumsum(human["length"]), strict=True))
     human_lengths = dict(zip(human["clip_id"].tolist(), human["length"], strict=True))
     ends = np.cumsum(recorded["length"])
@@ -152,7 +163,8 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         goal = np.unpackbits(human["goal_packed"][theirs], axis=1)[:, :KEYS].astype(bool)
         _fill(columns, goal, tips, finger_key)
         f1 = frame_metrics(goal, columns["pressed"]).f1
-        yield Episode(f"clip{clip:03d}", f1, "ik", columns), len(ends)
+        name = f"clip{clip:03d}"
+        yield Episode(name, f1, "ik", columns, songs[clip], splits[clip]), len(ends)
 
 
 def world_order(recorded: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -193,10 +205,12 @@ def _fill(
     columns["residual"][:] = columns["action"] - columns["prior"]
 
 
-def _arrays(path: Path, names: str) -> dict[str, NDArray[Any]]:
+def _arrays(path: Path, names: str, more: str = "") -> dict[str, NDArray[Any]]:
+    """Arrays of a file by name, and those of `more` that it has."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in names.split()}
+            there = [name for name in more.split() if name in file]
+            return {name: file[name] for name in [*names.split(), *there]}
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist") from None
     except KeyError as error:

@@ -10,7 +10,7 @@ Read it with no more than zarr:
         joints, action = data["joints"][first:end], data["action"][first:end]
 
 Every array's attribute `about` says what it holds; the group's attribute `episodes` has the name,
-the F1 and the prior of each episode.
+the F1, the prior, the song and the split of each episode.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from pianomime.errors import InputError
 from pianomime.learn.episode import COLUMNS, Episode
 
 FORMAT = "pianomime experts"
-VERSION = 1
+VERSION = 2
 _CHUNK = 4096
 
 
@@ -69,7 +69,15 @@ def write_expert_data(path: Path, episodes: Iterator[Episode]) -> int:
             for name in COLUMNS:
                 _array(group, name).append(episode.columns[name])
             ends.append(ends[-1] + len(episode.columns["goal"]))
-            about.append({"name": episode.name, "f1": episode.f1, "prior": episode.prior_name})
+            about.append(
+                {
+                    "name": episode.name,
+                    "f1": episode.f1,
+                    "prior": episode.prior_name,
+                    "song": episode.song,
+                    "split": episode.split,
+                }
+            )
         if not about:
             raise InputError("there are no episodes to collect")
         marks = group.create_array("episode_end", data=np.array(ends[1:], np.int64))
@@ -95,7 +103,7 @@ class ExpertData:
     Attributes:
         group: the zarr group.
         ends: (E,) one past the last row of each episode.
-        episodes: name, f1 and prior of each.
+        episodes: name, f1, prior, song and split of each, see `Episode`.
     """
 
     group: zarr.Group
@@ -139,7 +147,9 @@ class ExpertData:
         rows = slice(first, int(self.ends[number]))
         about = self.episodes[number]
         columns = {name: np.asarray(_array(self.group, name)[rows]) for name in COLUMNS}
-        return Episode(about["name"], about["f1"], about["prior"], columns)
+        return Episode(
+            about["name"], about["f1"], about["prior"], columns, about["song"], about["split"]
+        )
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:

@@ -1,0 +1,75 @@
+"""`pianomime train`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from pianomime.learn.generalist.config import STAGES, Size, StageConfig, StageName, stage_config
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train one network of a player that plays every song, by imitation.
+
+    A player of two stages needs two, and those that see goals by their codes need a goal encoder
+    first (`pianomime train-goal`). OUT then holds STAGE.onnx, and in the folder STAGE the training.
+    Started again it goes on where it was. Set PIANOMIME_WEIGHTS=OUT to play with what is in OUT.
+
+    Examples:
+      pianomime train high-diff --demonstrations demonstrations.npz
+      pianomime train low-diff --experts experts.zarr
+      pianomime train low-diff-res --experts experts.zarr --fit.steps 50000
+      pianomime train high-diff --size paper --demonstrations demos -o out/paper
+    """
+
+    stage: Annotated[tyro.conf.Positional[StageName], tyro.conf.arg(metavar="STAGE")]
+    """Which network."""
+    demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
+    """What high levels learn from: a folder of demonstrations, or published clips (.npz)."""
+    experts: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
+    """What all others learn from: a data set that `pianomime collect` made."""
+    goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    """The goal encoder; OUT/goal if not given."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
+    """Folder for the results, shared by all stages."""
+    size: Size = "small"
+    """Of the network: one for two cores, or the paper's for a GPU; settings below change it."""
+    config: Annotated[StageConfig, tyro.conf.arg(name="")] = field(
+        default_factory=lambda: stage_config("high-diff")
+    )
+    """Everything else."""
+
+    @classmethod
+    def default(cls, arguments: list[str]) -> Train:
+        """What holds for arguments that are not given: that is for stage and size to say."""
+        stage = next((name for name in STAGES if name in arguments), STAGES[0])
+        size: Size = "paper" if "paper" in arguments or "--size=paper" in arguments else "small"
+        return cls(stage=tyro.MISSING, config=stage_config(stage, size))
+
+    def run(self) -> None:
+        """Train.
+
+        Raises:
+            InputError: data are missing or cannot be used, or OUT holds another training.
+            OSError: a file cannot be read or written.
+        """
+        from pianomime.commands.extras import extra
+        from pianomime.commands.progress import bars
+
+        with extra("train"), bars() as tell:
+            from pianomime.learn.generalist.training import train_stage
+
+            made = train_stage(
+                self.stage,
+                self.config,
+                self.out,
+                self.demonstrations,
+                self.experts,
+                self.goal or self.out / "goal",
+                lambda done, total, remark: tell(self.stage, done, total, remark),
+            )
+        print(f"saved: {made}")

@@ -1,0 +1,66 @@
+"""The players that have learned to play every song, and where their weights are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from pianomime.errors import InputError
+from pianomime.generalist.player import Generalist
+from pianomime.generalist.policy import load_policy
+from pianomime.generalist.sampler import Sampler
+
+METHODS: dict[str, tuple[str, ...]] = {
+    "two-stage-diff": ("high-diff", "low-diff"),
+    "two-stage-diff-no-sdf": ("high-diff-no-sdf", "low-diff-no-sdf"),
+    "two-stage-diff-res": ("high-diff", "low-diff-res"),
+    "two-stage-bet": ("high-bet", "low-bet"),
+    "one-stage-diff": ("one-stage-diff",),
+    "bc-mse": ("bc-mse",),
+    "multi-task-sac": ("multi-task-sac",),
+}
+"""The stages of each method of the paper: from goals to fingertips and on to controls, or from
+goals to controls at once (appendix G)."""
+
+WEIGHTS = "PIANOMIME_WEIGHTS"
+"""Name of the environment variable that tells a folder of weights other than those that came with
+the program."""
+
+_SAMPLERS = (Sampler(5), Sampler(10), Sampler(20), Sampler(100, eta=1.0))
+"""By effort; the last one is the paper's."""
+
+
+def make_generalist(method: str, effort: int, seed: int = 0) -> Generalist:
+    """A player by the name of its method.
+
+    Args:
+        method: one of `METHODS`.
+        effort: 0 to 3: how many steps a diffusion is run.
+        seed: of what it draws.
+
+    Raises:
+        InputError: its weights are not there, or cannot be read.
+    """
+    stages = [load_policy(stage_path(stage), _SAMPLERS[effort]) for stage in METHODS[method]]
+    *high, low = stages
+    return Generalist(low, high[0] if high else None, bool(low.about["prior"]), seed=seed)
+
+
+def weights_folder() -> Path:
+    """Where weights are looked for."""
+    return Path(os.environ.get(WEIGHTS) or Path(__file__).with_name("weights"))
+
+
+def stage_path(stage: str) -> Path:
+    """The file of a stage.
+
+    Raises:
+        InputError: it is not there.
+    """
+    path = weights_folder() / f"{stage}.onnx"
+    if not path.is_file():
+        raise InputError(
+            f"{path} is not there: train it with `pianomime train {stage}`, or name a folder of "
+            f"weights in {WEIGHTS}"
+        )
+    return path

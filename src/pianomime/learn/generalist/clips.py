@@ -1,0 +1,150 @@
+"""The data that generalists learn from: clips, one after the other, that no sample crosses."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.archive import read_arrays
+from pianomime.errors import InputError
+from pianomime.learn.expert_data import ExpertData
+from pianomime.video.demonstration import Demonstration
+from pianomime.video.published import read_published
+
+HUMAN = ("goal", "fingertips")
+"""Columns of clips of humans."""
+EXPERT = (*HUMAN, "joints", "velocities", "keys", "prior", "action")
+"""Columns of clips of experts, as `pianomime.learn.episode.COLUMNS` describes them."""
+_HELD_OUT = 12
+"""Every how manieth song is kept from training, to see how well it generalises."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clips:
+    """Frames of clips.
+
+    Attributes:
+        columns: arrays (T, ...) by name.
+        ends: (N,) one past the last frame of each clip.
+        song: (N,) number that clips of one song share.
+        name: of each clip.
+    """
+
+    columns: dict[str, NDArray[Any]]
+    ends: NDArray[np.int64]
+    song: NDArray[np.int64]
+    name: list[str]
+
+    def __len__(self) -> int:
+        """Number of clips."""
+        return len(self.ends)
+
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """(N,) the first frame of each clip."""
+        return np.concatenate(([0], self.ends[:-1]))
+
+    def some(self, which: NDArray[np.bool_]) -> Clips:
+        """The clips (N,) that are marked."""
+        rows = np.repeat(which, np.diff(self.ends, prepend=0))
+        return Clips(
+            {name: array[rows] for name, array in self.columns.items()},
+            np.cumsum(np.diff(self.ends, prepend=0)[which]),
+            self.song[which],
+            [name for name, kept in zip(self.name, which, strict=True) if kept],
+        )
+
+    def fingerprint(self) -> str:
+        """Tells data from others."""
+        digest = hashlib.sha256(json.dumps([self.name, self.ends.tolist()]).encode())
+        for name in sorted(self.columns):
+            digest.update(np.ascontiguousarray(self.columns[name]).data)
+        return digest.hexdigest()[:16]
+
+    def split(self) -> tuple[Clips, Clips]:
+        """To learn from, and to see how well that went: no song is on both sides."""
+        songs = np.unique(self.song)
+        held = np.isin(self.song, songs[_HELD_OUT // 2 :: _HELD_OUT])
+        return self.some(~held), self.some(held)
+
+
+def human_clips(source: Path) -> Clips:
+    """How humans play.
+
+    Args:
+        source: a folder of demonstrations, as `retarget` and `import-demos` write them, or an .npz
+            file of published clips (length, fingertips, goal_packed). Of a file that tells `split`
+            only what is called "train" is taken, and its `song_group` tells which are of one song.
+
+    Raises:
+        OSError: there is no such file.
+        InputError: it holds no demonstrations, or values that are not finite.
+    """
+    if source.is_dir():
+        files = sorted(source.rglob("*.npz"))
+        found = [(Demonstration.load(file), number) for number, file in enumerate(files)]
+    else:
+        arrays = read_arrays(source, "an .npz file of arrays")
+        count = len(arrays.get("length", [0]))
+        song = arrays.get("song_group", np.arange(count))
+        split = arrays.get("split", np.full(count, "train"))
+        odd = arrays.get("odd", np.zeros(count, bool))
+        if not len(song) == len(split) == len(odd) == count:
+            raise InputError(f"{source}: song_group, split and odd must have a value a clip")
+        found = [
+            (demonstration, int(song[number]))
+            for number, (demonstration, _) in enumerate(read_published(source))
+            if split[number] == "train" and not odd[number]
+        ]
+    return _together(
+        source,
+        (
+            (
+                one.score.title,
+                song,
+                {"goal": one.score.roll(), "fingertips": one.plan.fingertips.astype(np.float32)},
+            )
+            for one, song in found
+        ),
+    )
+
+
+def expert_clips(source: Path) -> Clips:
+    """How experts play: the episodes of a data set that are for training.
+
+    Raises:
+        InputError: there is no such data set, or values in it are not finite.
+    """
+    data = ExpertData.open(source)
+    clips = []
+    for number, about in enumerate(data.episodes):
+        if about["split"] == "train":
+            columns = data.episode(number).columns
+            song = about["song"] if about["song"] >= 0 else -number - 1
+            clips.append((about["name"], song, {name: columns[name] for name in EXPERT}))
+    return _together(source, clips)
+
+
+def _together(source: Path, clips: Iterable[tuple[str, int, dict[str, NDArray[Any]]]]) -> Clips:
+    names, songs, columns = [], [], []
+    for name, song, arrays in clips:
+        for column, array in arrays.items():
+            if array.dtype.kind == "f" and not np.isfinite(array).all():
+                raise InputError(f"{source}: {column} of {name} has values that are not finite")
+        names.append(name)
+        songs.append(song)
+        columns.append(arrays)
+    if not names:
+        raise InputError(f"{source}: holds nothing to train on")
+    ends = np.cumsum([len(arrays["goal"]) for arrays in columns])
+    together = {
+        column: np.concatenate([arrays[column] for arrays in columns]) for column in columns[0]
+    }
+    return Clips(together, ends, np.array(songs), names)

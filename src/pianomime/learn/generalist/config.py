@@ -1,0 +1,139 @@
+"""Every choice in learning a generalist: typed, saved with it, and the command line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+from pianomime.generalist.horizon import CHUNK
+from pianomime.learn.fit_config import FitConfig
+
+Size = Literal["small", "paper"]
+StageName = Literal[
+    "high-diff",
+    "high-diff-no-sdf",
+    "high-bet",
+    "low-diff",
+    "low-diff-no-sdf",
+    "low-diff-res",
+    "low-bet",
+    "one-stage-diff",
+    "bc-mse",
+]
+STAGES: tuple[StageName, ...] = get_args(StageName)
+
+
+@dataclass(frozen=True)
+class DiffusionConfig:
+    """A U-Net that takes noise off chunks (paper, table 7)."""
+
+    channels: tuple[int, ...] = (32, 64, 128)
+    """Filters of each level of the U-Net."""
+    kernel: int = 5
+    """Of its convolutions."""
+    encoder: tuple[int, ...] = (32, 64)
+    """Filters of the temporal convolutions over what is seen of the frames ahead."""
+    encoder_kernel: int = 3
+    """Of those."""
+    condition: int = 128
+    """Numbers into which all that is seen is brought together; 0 to leave it as it is."""
+    step_width: int = 64
+    """Numbers that tell the step of the diffusion."""
+    steps: int = 100
+    """Steps of the diffusion."""
+    prediction: Literal["epsilon", "sample"] = "sample"
+    """What the network says: the noise, or what is without it."""
+
+
+@dataclass(frozen=True)
+class BetConfig:
+    """A behaviour transformer: which of some typical chunks, and how far off (paper, table 8)."""
+
+    layers: int = 4
+    heads: int = 4
+    width: int = 64
+    bins: int = 64
+    """Typical chunks."""
+    offset_weight: float = 10.0
+    """Of the loss of the offset, beside that of the choice."""
+
+
+@dataclass(frozen=True)
+class MlpConfig:
+    """A network without structure (paper, appendix G, BC-MSE)."""
+
+    hidden: tuple[int, ...] = (512, 512, 512)
+    """Width of each hidden layer."""
+
+
+@dataclass(frozen=True)
+class StageConfig:
+    """One network of a generalist."""
+
+    level: Literal["high", "low", "whole"]
+    """From goals to fingertips, from fingertips to controls, or from goals to controls at once."""
+    network: Literal["diffusion", "bet", "mlp"]
+    """Its kind."""
+    code: Literal["sdf", "binary"] = "sdf"
+    """How goals are told: by the goal encoder, or as they are."""
+    prior: bool = False
+    """Whether controls are told as what to add to those of inverse kinematics."""
+    transpose: bool = True
+    """Whether samples are moved by octaves by chance."""
+    tip_noise: float = 0.0
+    """[m] Noise that is added to present fingertips in training."""
+    diffusion: DiffusionConfig = field(default_factory=DiffusionConfig)
+    bet: BetConfig = field(default_factory=BetConfig)
+    mlp: MlpConfig = field(default_factory=MlpConfig)
+    fit: FitConfig = field(default_factory=lambda: FitConfig(steps=20_000, learning_rate=3e-4))
+
+    @property
+    def chunk(self) -> int:
+        """Frames that are said at once; a feedforward network says the next one."""
+        return 1 if self.network == "mlp" else CHUNK
+
+
+_NOISE = 0.01
+
+_STAGES: dict[StageName, StageConfig] = {
+    "high-diff": StageConfig("high", "diffusion", tip_noise=_NOISE),
+    "high-diff-no-sdf": StageConfig("high", "diffusion", "binary", tip_noise=_NOISE),
+    "high-bet": StageConfig("high", "bet", tip_noise=_NOISE),
+    "low-diff": StageConfig("low", "diffusion"),
+    "low-diff-no-sdf": StageConfig("low", "diffusion", "binary"),
+    "low-diff-res": StageConfig("low", "diffusion", prior=True),
+    "low-bet": StageConfig("low", "bet"),
+    "one-stage-diff": StageConfig("whole", "diffusion"),
+    "bc-mse": StageConfig("whole", "mlp", "binary"),
+}
+
+_PAPER = {
+    "diffusion": DiffusionConfig(
+        channels=(256, 512, 1024), condition=0, step_width=256, prediction="epsilon"
+    ),
+    "bet": BetConfig(layers=8, heads=8, width=120),
+    "mlp": MlpConfig(hidden=(1024, 1024, 1024)),
+}
+"""Tables 7 and 8, and appendix G."""
+
+
+def stage_config(stage: StageName, size: Size = "small") -> StageConfig:
+    """The config of a stage by its name.
+
+    The paper's size is trained as in its tables: as many passes over the data, at its rates.
+    """
+    config = _STAGES[stage]
+    if size == "small":
+        return config
+    rate = 3e-4 if config.network == "bet" else 1e-4
+    epochs = 1200 if config.network == "bet" else 800
+    steps = epochs * _FRAMES // config.fit.batch
+    return replace(
+        config,
+        fit=replace(config.fit, steps=steps, learning_rate=rate),
+        **{config.network: _PAPER[config.network]},  # type: ignore[arg-type]
+    )
+
+
+_FRAMES = 110_000
+"""Pairs of state and action in the paper's data."""

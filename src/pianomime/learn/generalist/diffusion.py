@@ -1,0 +1,54 @@
+"""Chunks by diffusion: noise is added to what should be said, a network learns to take it off."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from diffusers.schedulers import DDPMScheduler
+from torch import Tensor, nn
+
+from pianomime.learn.generalist.config import DiffusionConfig
+from pianomime.learn.generalist.sizes import Sizes
+from pianomime.learn.generalist.unet import ConditionalUnet, TemporalEncoder
+
+
+def noise_schedule(config: DiffusionConfig) -> Any:
+    """How much noise there is at each step, a `DDPMScheduler`."""
+    return DDPMScheduler(  # type: ignore[no-untyped-call]
+        num_train_timesteps=config.steps,
+        beta_schedule="squaredcos_cap_v2",
+        prediction_type=config.prediction,
+        clip_sample=True,
+    )
+
+
+class DiffusionNet(nn.Module):
+    """A conditional U-Net and its noise.
+
+    Args:
+        sizes: of what is given and said.
+        config: its own.
+    """
+
+    def __init__(self, sizes: Sizes, config: DiffusionConfig) -> None:
+        super().__init__()
+        self.encoder = TemporalEncoder(sizes.frames, sizes.channels, config)
+        seen = self.encoder.width + sizes.vector
+        self.together = nn.Linear(seen, config.condition) if config.condition else nn.Identity()
+        self.unet = ConditionalUnet(sizes.width, config.condition or seen, config)
+        self.config, self.schedule = config, noise_schedule(config)
+
+    def forward(self, ahead: Tensor, vector: Tensor, noisy: Tensor, step: Tensor) -> Tensor:
+        """(B, T, D): the noise in chunks (B, T, D) at steps (B,), or what is without it."""
+        seen = torch.cat([self.encoder(ahead), vector], dim=1)
+        out: Tensor = self.unet(noisy, step, self.together(seen))
+        return out
+
+    def loss(self, ahead: Tensor, vector: Tensor, target: Tensor) -> Tensor:
+        """Mean squared error at steps by chance."""
+        noise = torch.randn_like(target)
+        step = torch.randint(0, self.config.steps, (len(target),), device=target.device)
+        noisy = self.schedule.add_noise(target, noise, step)
+        wanted = noise if self.config.prediction == "epsilon" else target
+        return nn.functional.mse_loss(self(ahead, vector, noisy, step).float(), wanted)

@@ -1,0 +1,116 @@
+"""Training of one stage of a generalist, from data to the file that is played."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.generalist.features import TIPS, base
+from pianomime.generalist.sampler import Sampler
+from pianomime.learn.config import to_json
+from pianomime.learn.fit import fit
+from pianomime.learn.generalist.clips import Clips, expert_clips, human_clips
+from pianomime.learn.generalist.config import StageConfig
+from pianomime.learn.generalist.export import export_stage, torch_policy
+from pianomime.learn.generalist.stage import Stage
+from pianomime.learn.generalist.windows import Windows
+from pianomime.learn.goal import load_encoder
+from pianomime.learn.tell import Tell
+
+_SCALED_BY = 20_000
+"""Samples from which scales are taken."""
+_MEASURED = 1024
+"""Samples of songs that were kept from training, by which it is seen how well they are told."""
+
+
+def train_stage(
+    name: str,
+    config: StageConfig,
+    out: Path,
+    demonstrations: Path | None,
+    experts: Path | None,
+    goal: Path | None,
+    tell: Tell | None = None,
+) -> Path:
+    """Train a stage, or go on where its training was.
+
+    Args:
+        name: of the stage.
+        config: how.
+        out: folder for it; `NAME.onnx` is the result, and `NAME` holds the training.
+        demonstrations: what high levels learn from, see `human_clips`.
+        experts: what all others learn from, see `expert_clips`.
+        goal: folder of the goal encoder, where it is used.
+        tell: told how far it is.
+
+    Returns:
+        The result.
+
+    Raises:
+        InputError: data are missing or cannot be used, or the folder holds another training.
+        OSError: a file cannot be read or written.
+    """
+    clips = _data(config, demonstrations, experts)
+    encoder = None
+    if config.code == "sdf":
+        if goal is None:
+            raise InputError(f"{name} needs a goal encoder (--goal): `pianomime train-goal`")
+        encoder = load_encoder(goal)
+    learned, held = (Windows.of(some, config) for some in clips.split())
+    sample = learned.some(_SCALED_BY)
+    torch.manual_seed(config.fit.seed)
+    stage = Stage(config, {key: value.shape[1:] for key, value in sample.items()}, encoder)
+    stage.fit_scales(sample)
+    about = {"stage": name, **to_json(config), "data": clips.fingerprint()}
+    out.mkdir(parents=True, exist_ok=True)
+    fit(
+        out / name,
+        stage,
+        lambda network, batch: network(batch),
+        learned.draw,
+        config.fit,
+        _measure(held),
+        tell,
+        about,
+    )
+    result = out / f"{name}.onnx"
+    export_stage(stage, name, result)
+    return result
+
+
+def _data(config: StageConfig, demonstrations: Path | None, experts: Path | None) -> Clips:
+    if config.level == "high":
+        if demonstrations is None:
+            raise InputError("a high level learns from --demonstrations")
+        return human_clips(demonstrations)
+    if experts is None:
+        raise InputError("it learns from --experts, a data set that `pianomime collect` makes")
+    return expert_clips(experts)
+
+
+def _measure(held: Windows) -> Callable[[torch.nn.Module], dict[str, float]]:
+    """How far off the first frame of chunks is, in songs that were kept from training."""
+    sample, config = held.some(_MEASURED), held.config
+    given = {key: sample[key] for key in ("goal", "frames", "vector")}
+    true = sample["target"] + base(config.level, config.prior, sample["vector"])
+
+    def measure(module: torch.nn.Module) -> dict[str, float]:
+        assert isinstance(module, Stage)
+        policy = torch_policy(module, sampler=Sampler())
+        off = np.abs(policy.say(given, np.random.default_rng(0)) - true)[:, 0]
+        usual = np.abs(sample["target"])[:, 0]
+        if config.level == "high":
+            return {"unseen/off_mm": _tips(off), "unseen/off_mm_if_still": _tips(usual)}
+        return {"unseen/off": float(off.mean()), "unseen/off_if_still": float(usual.mean())}
+
+    return measure
+
+
+def _tips(off: NDArray[np.float32]) -> float:
+    """Mean distance along x and y [mm] of points (B, 36)."""
+    return float(off.reshape(len(off), TIPS // 3, 3)[..., :2].mean() * 1e3)
