@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -30,3 +32,21 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary = Path(folder, target.name)
         yield temporary
         os.replace(temporary, target)
+
+
+def leftovers(folder: Path, names: Iterable[str]) -> list[str]:
+    """Names of the folders in which `atomic` was writing files when its process was killed.
+
+    Args:
+        folder: where the files should have ended up.
+        names: of the files.
+    """
+    ours = "|".join(re.escape(Path(name).stem) for name in names)
+    form = re.compile(rf"\.({ours})-\w+")
+    return [file.name for file in folder.iterdir() if form.fullmatch(file.name) and file.is_dir()]
+
+
+def sweep(folder: Path, names: Iterable[str]) -> None:
+    """Remove `leftovers`; nobody may be writing these files."""
+    for name in leftovers(folder, names):
+        shutil.rmtree(folder / name, ignore_errors=True)

@@ -197,6 +197,18 @@ def from_json(kind: type[_T], content: Any) -> _T:
     return kind(**{name: _value(name, hints[name], value) for name, value in content.items()})
 
 
+def differences(there: dict[str, Any], now: dict[str, Any], within: str = "") -> list[str]:
+    """What two configs, as JSON has them, differ in: "name: value there, value now"."""
+    found: list[str] = []
+    for name in {**there, **now}:
+        one, other = there.get(name), now.get(name)
+        if isinstance(one, dict) and isinstance(other, dict):
+            found += differences(one, other, f"{within}{name}.")
+        elif one != other:
+            found.append(f"{within}{name}: {one} there, {other} now")
+    return found
+
+
 def _value(name: str, hint: Any, value: Any) -> Any:
     if dataclasses.is_dataclass(hint):
         return from_json(typing.cast(type[Any], hint), value)

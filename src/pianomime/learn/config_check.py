@@ -14,8 +14,8 @@ def check_config(config: ExpertConfig) -> None:
     Raises:
         InputError: the first of them, as it is called on the command line.
     """
-    _within("steps", config.steps, 1)
-    _within("seed", config.seed, 0)
+    within("steps", config.steps, 1)
+    within("seed", config.seed, 0)
     check_env(config.env)
     if config.method == "ppo":
         _check_ppo(config.ppo)
@@ -30,28 +30,28 @@ def check_env(config: EnvConfig) -> None:
         InputError: the first of them, as it is called on the command line.
     """
     seen = config.observation
-    _within("env.observation.goal", seen.goal, 0)
-    _within("env.observation.fingertips", seen.fingertips, 0)
+    within("env.observation.goal", seen.goal, 0)
+    within("env.observation.fingertips", seen.fingertips, 0)
     if not any(vars(seen).values()):
         raise InputError("env.observation: a policy must see something")
-    _within("env.action.factor", config.action.factor, 0)
+    within("env.action.factor", config.action.factor, 0)
     for name, weight in vars(config.reward).items():
-        _within(f"env.reward.{name}", weight, 0)
-    _within("env.reward.hit", config.reward.hit, 0, 1)
-    _within("env.episode.frames", config.episode.frames, 0)
+        within(f"env.reward.{name}", weight, 0)
+    within("env.reward.hit", config.reward.hit, 0, 1)
+    within("env.episode.frames", config.episode.frames, 0)
 
 
 def _check_ppo(config: PpoConfig) -> None:
     for name in ("envs", "epochs", "evaluate_every"):
-        _within(f"ppo.{name}", getattr(config, name), 1)
+        within(f"ppo.{name}", getattr(config, name), 1)
     for name in ("learning_rate", "decay", "clip", "gradient_norm", "noise"):
-        _above_zero(f"ppo.{name}", getattr(config, name))
+        above_zero(f"ppo.{name}", getattr(config, name))
     for name in ("discount", "gae"):
-        _within(f"ppo.{name}", getattr(config, name), 0, 1)
+        within(f"ppo.{name}", getattr(config, name), 0, 1)
     for name in ("entropy", "value", "target_kl"):
-        _within(f"ppo.{name}", getattr(config, name), 0)
+        within(f"ppo.{name}", getattr(config, name), 0)
     for width in config.hidden:
-        _within("ppo.hidden", width, 1)
+        within("ppo.hidden", width, 1)
     steps = config.steps_per_update
     if steps < config.envs or steps % config.envs:
         raise InputError(
@@ -65,19 +65,29 @@ def _check_ppo(config: PpoConfig) -> None:
 
 def _check_search(config: SearchConfig) -> None:
     for name in ("variations", "rounds", "commit", "ahead"):
-        _within(f"search.{name}", getattr(config, name), 1)
+        within(f"search.{name}", getattr(config, name), 1)
     if not config.sizes:
         raise InputError("search.sizes must be one number or more")
     for size in config.sizes:
-        _above_zero("search.sizes", size)
+        above_zero("search.sizes", size)
 
 
-def _within(name: str, value: float, least: float, most: float = math.inf) -> None:
+def within(name: str, value: float, least: float, most: float = math.inf) -> None:
+    """Refuse a number out of range, infinity and NaN among them.
+
+    Raises:
+        InputError: it is, told as it is called on the command line.
+    """
     if not (least <= value <= most and math.isfinite(value)):
         wanted = f"{least:g} or more" if most == math.inf else f"{least:g} to {most:g}"
         raise InputError(f"{name.replace('_', '-')} must be {wanted}, not {value:g}")
 
 
-def _above_zero(name: str, value: float) -> None:
+def above_zero(name: str, value: float) -> None:
+    """Refuse a number that is not more than 0, infinity and NaN among them.
+
+    Raises:
+        InputError: it is, told as it is called on the command line.
+    """
     if not 0 < value < math.inf:
         raise InputError(f"{name.replace('_', '-')} must be more than 0, not {value:g}")

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pianomime.errors import InputError
-from pianomime.files import atomic
-from pianomime.learn.config import ExpertConfig, from_json, to_json
+from pianomime.files import atomic, leftovers, sweep
+from pianomime.learn.config import ExpertConfig, differences, from_json, to_json
 from pianomime.learn.tensors import Arrays, read_tensors, write_tensors
 from pianomime.video.demonstration import Demonstration
 
@@ -22,6 +20,7 @@ _SONG = "song.npz"
 _STATE = "state.safetensors"
 _BEST = "expert.safetensors"
 _CURVE = "curve.json"
+_FILES = (_ABOUT, _SONG, _STATE, _BEST, _CURVE)
 
 
 @dataclass(frozen=True)
@@ -73,13 +72,13 @@ class RunFolder:
             if path.is_file():
                 raise InputError(f"{path}: is a file; a folder is needed")
             path.mkdir(parents=True, exist_ok=True)
-            left = {file.name for file in path.iterdir()} - {*_temporaries(path)}
+            left = {file.name for file in path.iterdir()} - {*leftovers(path, _FILES)}
             # The song comes first; another one of that name is somebody's.
             if left and not (
                 left == {_SONG} and _same_song(Demonstration.load(path / _SONG), song)
             ):
                 raise InputError(f"{path}: holds something else than a run; name another folder")
-            _sweep(path)
+            sweep(path, _FILES)
             if not left:
                 song.save(path / _SONG)
             run = cls(path, song, config, start, seconds)
@@ -88,12 +87,13 @@ class RunFolder:
         there = cls.load(path)
         if not _same_song(there.song, song):
             raise InputError(f"{path}: holds a run on another song, {there.song.score.title}")
-        if replace(there.config, steps=config.steps) != config:
-            odd = ", ".join(_differences(to_json(there.config), to_json(config)))
+        longer = replace(there.config, steps=config.steps)
+        if longer != config:
+            odd = ", ".join(differences(to_json(longer), to_json(config)))
             raise InputError(
                 f"{path}: holds a run with other settings ({odd}); name another folder"
             )
-        _sweep(path)
+        sweep(path, _FILES)
         run = replace(there, config=config)
         run._write_about()
         return run
@@ -211,18 +211,6 @@ def find_runs(path: Path) -> list[Path]:
     return found
 
 
-def _temporaries(path: Path) -> list[str]:
-    """Folders in which `atomic` was writing our files when its process was killed."""
-    ours = "|".join(re.escape(Path(name).stem) for name in (_ABOUT, _SONG, _STATE, _BEST, _CURVE))
-    form = re.compile(rf"\.({ours})-\w+")
-    return [file.name for file in path.iterdir() if form.fullmatch(file.name) and file.is_dir()]
-
-
-def _sweep(path: Path) -> None:
-    for name in _temporaries(path):
-        shutil.rmtree(path / name, ignore_errors=True)
-
-
 def _same_song(one: Demonstration, other: Demonstration) -> bool:
     mine, theirs = one.plan, other.plan
     return bool(
@@ -231,13 +219,3 @@ def _same_song(one: Demonstration, other: Demonstration) -> bool:
         and (mine.finger_key == theirs.finger_key).all()
         and (one.score.roll() == other.score.roll()).all()
     )
-
-
-def _differences(one: dict[str, Any], other: dict[str, Any], within: str = "") -> list[str]:
-    found: list[str] = []
-    for name, value in one.items():
-        if isinstance(value, dict):
-            found += _differences(value, other[name], f"{within}{name}.")
-        elif value != other[name] and name != "steps":
-            found.append(f"{within}{name}: {value} there, {other[name]} now")
-    return found

@@ -1,34 +1,36 @@
-"""The evaluations of a run, for TensorBoard."""
+"""Figures of a training, for TensorBoard."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
+from pathlib import Path
 
-from tensorboard.compat.proto.event_pb2 import Event
+from tensorboard.compat.proto.event_pb2 import Event, SessionLog
 from tensorboard.compat.proto.summary_pb2 import Summary
 from tensorboard.summary.writer.event_file_writer import EventFileWriter
 
-from pianomime.learn.run_folder import Evaluation, RunFolder
-
 
 class RunLog:
-    """Writes what PPO's logger writes of a song, without torch.
+    """Writes figures as they come, without torch.
 
     Args:
-        run: whose; the log is in its folder.
+        folder: of the logs.
+        since: the step that comes next. What a process that was killed wrote of that and later
+            ones is not shown any more.
     """
 
-    def __init__(self, run: RunFolder) -> None:
-        self._writer = EventFileWriter(str(run.tensorboard))
+    def __init__(self, folder: Path, since: int = 0) -> None:
+        self._writer = EventFileWriter(str(folder))
+        begin = SessionLog(status=SessionLog.START)
+        self._writer.add_event(Event(wall_time=time.time(), step=since, session_log=begin))
 
-    def add(self, made: Evaluation) -> None:
-        """Write an evaluation, at the steps that were spent by then."""
-        scalars = [
-            Summary.Value(tag=f"song/{name}", simple_value=getattr(made, name))
-            for name in ("precision", "recall", "f1")
-        ]
-        event = Event(wall_time=time.time(), step=made.steps, summary=Summary(value=scalars))
-        self._writer.add_event(event)
+    def add(self, step: int, figures: Mapping[str, float]) -> None:
+        """Write figures, each with its name, at a step."""
+        scalars = [Summary.Value(tag=name, simple_value=figure) for name, figure in figures.items()]
+        self._writer.add_event(
+            Event(wall_time=time.time(), step=step, summary=Summary(value=scalars))
+        )
         self._writer.flush()
 
     def close(self) -> None:

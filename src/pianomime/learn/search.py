@@ -43,7 +43,7 @@ def search(run: RunFolder, threads: int, tell: Tell) -> None:
     curve = run.curve()
     ctrl = None if state is None else state[0]["ctrl"]
     steps = run.steps_done
-    with closing(RunLog(run)) as log:
+    with closing(RunLog(run.tensorboard, steps + 1)) as log:
         while steps < run.config.steps:
             tracker = _pass(run, ctrl, len(curve), threads)
             played = _play(run, tracker, steps, curve, tell)
@@ -55,7 +55,7 @@ def search(run: RunFolder, threads: int, tell: Tell) -> None:
             assert ctrl is not None
             curve.append(made)
             run.checkpoint({"ctrl": ctrl}, {}, curve)
-            log.add(made)
+            log.add(steps, {f"song/{name}": figure for name, figure in _scores(played).items()})
 
 
 def pass_config(settings: SearchConfig, number: int, seed: int) -> RolloutConfig:
