@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,14 +13,12 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.generalist.features import TIPS, base
 from pianomime.generalist.sampler import Sampler
-from pianomime.learn.config import to_json
 from pianomime.learn.fit import fit
 from pianomime.learn.generalist.clips import Clips, expert_clips, human_clips
 from pianomime.learn.generalist.config import StageConfig
 from pianomime.learn.generalist.export import export_stage, torch_policy
 from pianomime.learn.generalist.stage import Stage
 from pianomime.learn.generalist.windows import Windows
-from pianomime.learn.goal import load_encoder
 from pianomime.learn.tell import Tell
 
 _SCALED_BY = 20_000
@@ -60,13 +59,15 @@ def train_stage(
     if config.code == "sdf":
         if goal is None:
             raise InputError(f"{name} needs a goal encoder (--goal): `pianomime train-goal`")
+        from pianomime.learn.goal import load_encoder
+
         encoder = load_encoder(goal)
     learned, held = (Windows.of(some, config) for some in clips.split())
     sample = learned.some(_SCALED_BY)
     torch.manual_seed(config.fit.seed)
     stage = Stage(config, {key: value.shape[1:] for key, value in sample.items()}, encoder)
     stage.fit_scales(sample)
-    about = {"stage": name, **to_json(config), "data": clips.fingerprint()}
+    about = {"stage": name, **dataclasses.asdict(config), "data": clips.fingerprint()}
     out.mkdir(parents=True, exist_ok=True)
     fit(
         out / name,

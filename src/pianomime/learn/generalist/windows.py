@@ -127,15 +127,15 @@ class Windows:
         used: NDArray[np.bool_] = goal.any(axis=1)
         if self.config.level != "high":
             used = used | (self.clips.columns["keys"][rows] > 0)
-        low = np.asarray((octaves < 0) & used[:, :_OCTAVE].any(axis=1))
-        high = (octaves > 0) & used[:, KEYS - _OCTAVE :].any(axis=1)
+        low, high = used[:, :_OCTAVE].any(axis=1), used[:, KEYS - _OCTAVE :].any(axis=1)
+        off_keys = np.where(octaves < 0, low, high)
         beyond = np.zeros(len(rows), bool)
         if self.config.level != "high":
             low_end, high_end = _slide_ends()
             action = _slid(self.clips.columns["action"][rows], octaves * octave(), _SLIDE_CONTROLS)
             slides = action[:, _SLIDE_CONTROLS]
             beyond = ((slides < low_end) | (slides > high_end)).any(axis=1)
-        return np.where(low | high | beyond, 0, octaves)
+        return np.where(off_keys | beyond, 0, octaves)
 
 
 @cache
