@@ -40,8 +40,8 @@ class BetNet(nn.Module):
 
     def forward(self, ahead: Tensor, vector: Tensor) -> tuple[Tensor, Tensor]:
         """(B, T, bins) how likely each typical action is, and (B, T, bins, D) each made exact."""
-        batch = len(ahead)
-        asked = torch.zeros(batch, self.chunk, self.place.shape[1], device=ahead.device)
+        # Not len(): ONNX export would take the batch of its example for that of all.
+        asked = ahead.new_zeros(ahead.shape[0], self.chunk, self.place.shape[1])
         tokens = torch.cat([self.ahead(ahead), self.vector(vector)[:, None], asked], dim=1)
         out = self.normal(self.layers(tokens + self.place))[:, -self.chunk :]
         offset = self.offset(out).reshape(*out.shape[:2], *self.centres.shape)

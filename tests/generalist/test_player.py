@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pianomime import Player
+from pianomime.errors import InputError
+from pianomime.generalist.features import base
+from pianomime.generalist.methods import METHODS, WEIGHTS
+from pianomime.generalist.player import Generalist
+from pianomime.music import Score
+from pianomime.world.figures import key_centres
+
+SCORE = Score([44, 25], [0.2, 0.4], [0.6, 0.8], [80, 80], pedal=np.zeros((0, 2)), title="two")
+
+
+class Still:
+    """Says that everything stays where it is, and keeps what it was shown."""
+
+    def __init__(self, level):
+        self.level, self.seen = level, []
+
+    def say(self, seen, draw):
+        self.seen.append(seen)
+        return np.repeat(base(self.level, False, seen["vector"]), 4, axis=1)
+
+
+class Pointing(Still):
+    """Puts a finger near whatever is due."""
+
+    def say(self, seen, draw):
+        said = super().say(seen, draw).reshape(1, 4, 2, 6, 3)
+        for key in np.flatnonzero(seen["goal"][0, 0]):
+            said[:, :, int(key > 40), 2, 1] = key_centres()[key, 1] + 0.005
+        return said.reshape(1, 4, 36)
+
+
+def play(generalist):
+    return Player("made up", generalist, generalist).play(SCORE)
+
+
+def test_the_plan_that_is_kept_is_what_was_wanted_on_the_way():
+    high, low = Pointing("high"), Still("low")
+    performance = play(Generalist(low, high))
+    plan = performance.plan
+    np.testing.assert_array_equal(plan.keys(), SCORE.roll())
+    assert plan.note_hand.tolist() == [1, 0]
+    assert plan.note_finger.tolist() == [1, 1]
+    frame, hand, finger = np.nonzero(plan.finger_key >= 0)
+    key = plan.finger_key[frame, hand, finger]
+    np.testing.assert_allclose(plan.fingertips[frame, hand, finger + 1, 1], key_centres()[key, 1])
+    # The low level saw the same, for as far as it looks ahead.
+    shown = low.seen[4]["frames"][0, 0, :36].reshape(2, 6, 3)
+    np.testing.assert_allclose(shown, plan.fingertips[4], atol=1e-6)
+
+
+def test_goals_ahead_end_in_silence():
+    high = Pointing("high")
+    performance = play(Generalist(Still("low"), high))
+    roll = SCORE.roll()
+    assert len(high.seen) == len(roll) == len(performance.plan)
+    np.testing.assert_array_equal(high.seen[2]["goal"][0], roll[2:12].astype(float))
+    assert not high.seen[-1]["goal"][0, 1:].any()
+
+
+def test_a_policy_of_one_stage_plays_without_a_plan():
+    low = Still("whole")
+    performance = play(Generalist(low, None))
+    assert low.seen[0]["frames"].shape == (1, 4, 0)
+    assert np.isfinite(performance.plan.fingertips).all()
+    assert len(performance.plan) == SCORE.frames()
+
+
+def test_a_chunk_is_held_for_as_many_frames_as_asked():
+    low = Still("low")
+    play(Generalist(low, Pointing("high"), hold=4))
+    assert len(low.seen) == -(-SCORE.frames() // 4)
+
+
+def test_the_same_seed_plays_the_same():
+    first, again = (play(Generalist(Still("low"), Pointing("high"))) for _ in range(2))
+    np.testing.assert_array_equal(first.ctrl, again.ctrl)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_without_weights_there_is_one_clear_line(method, tmp_path, monkeypatch):
+    monkeypatch.setenv(WEIGHTS, str(tmp_path))
+    with pytest.raises(InputError, match="pianomime train") as error:
+        Player.from_name(method)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,156 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from pianomime.errors import InputError
+from pianomime.generalist.features import base
+from pianomime.generalist.policy import load_policy
+from pianomime.generalist.sampler import Sampler
+from pianomime.learn.generalist.config import STAGES, DiffusionConfig, stage_config
+from pianomime.learn.generalist.export import export_stage, torch_policy
+from pianomime.learn.generalist.stage import SaidScale, Stage
+from pianomime.learn.generalist.unet import TemporalEncoder
+from pianomime.learn.generalist.windows import Windows
+
+SEEN = ("goal", "frames", "vector")
+TINY = DiffusionConfig(channels=(16, 32, 32), condition=32, step_width=16)
+
+
+def a_stage(clips, name, size="small", **changes):
+    config = replace(stage_config(name, size), code="binary", tip_noise=0.0, **changes)
+    sample = Windows.of(clips, config).some(57)
+    torch.manual_seed(0)
+    stage = Stage(config, {key: value.shape[1:] for key, value in sample.items()}, None)
+    return stage, sample
+
+
+def by_hand(stage):
+    """Parameters of a U-Net and its encoder, counted from tables 7 and the sizes seen."""
+    config, (channels, vector) = stage.config.diffusion, seen_widths(stage)
+    width, told = len(stage.target.middle), config.step_width
+    frames = 10 if stage.config.level == "high" else 4
+    count, before = 0, channels
+    for after in config.encoder:
+        count += before * after * config.encoder_kernel + 3 * after
+        before = after
+    film = frames * before + vector + told
+    count += told * 4 * told + 4 * told + 4 * told * told + told
+
+    def block(before, after):
+        convolutions = (before + after) * after * config.kernel + 2 * 3 * after
+        past = before * after + after if before != after else 0
+        return convolutions + film * 2 * after + 2 * after + past
+
+    first, second, third = config.channels
+    for before, after in ((width, first), (first, second), (second, third)):
+        count += block(before, after) + block(after, after)
+    count += sum(after * after * 3 + after for after in (first, second))
+    count += 2 * block(third, third)
+    for before, after in ((third, second), (second, first)):
+        count += block(2 * before, after) + block(after, after) + after * after * 4 + after
+    return count + first * first * config.kernel + 3 * first + first * width + width
+
+
+def seen_widths(stage):
+    return 88 + len(stage.frames.middle), len(stage.vector.middle)
+
+
+@pytest.mark.parametrize("name", ["high-diff", "low-diff", "low-diff-res", "one-stage-diff"])
+def test_the_papers_size_has_as_many_parameters_as_table_7_makes(clips, name):
+    with torch.device("meta"):  # shapes alone
+        stage, _ = a_stage(clips, name, "paper")
+    assert stage.parameters_learned == pytest.approx(by_hand(stage), rel=0.05)
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_what_is_said_has_the_shape_of_what_should_be(clips, name):
+    stage, sample = a_stage(clips, name)
+    stage.fit_scales(sample)
+    policy = torch_policy(stage, sampler=Sampler(2))
+    told = policy.say({key: sample[key] for key in SEEN}, np.random.default_rng(0))
+    assert told.shape == sample["target"].shape
+    assert np.isfinite(told).all()
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_onnx_says_what_torch_says(clips, name, tmp_path):
+    stage, sample = a_stage(clips, name, diffusion=TINY)
+    stage.fit_scales(sample)
+    export_stage(stage, name, tmp_path / "stage.onnx")
+    given = {key: sample[key] for key in SEEN}
+    ours, theirs = (
+        policy.say(given, np.random.default_rng(3))
+        for policy in (
+            load_policy(tmp_path / "stage.onnx", Sampler(3)),
+            torch_policy(stage, sampler=Sampler(3)),
+        )
+    )
+    np.testing.assert_allclose(ours, theirs, atol=2e-4)
+
+
+@pytest.mark.parametrize(("name", "steps"), [("high-diff", 250), ("high-bet", 150), ("bc-mse", 150)])
+def test_it_learns_a_clip_by_heart(clips, name, steps):
+    stage, sample = a_stage(clips, name, diffusion=TINY)
+    stage.fit_scales(sample)
+    # A few frames, each with much noise of many kinds.
+    sample = {key: np.repeat(value[::10], 10, axis=0) for key, value in sample.items()}
+    batch = {key: torch.from_numpy(value) for key, value in sample.items()}
+    optimizer = torch.optim.AdamW(stage.net.parameters(), 3e-3)
+    stage.train()
+    for _ in range(steps):
+        loss = stage(batch)
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    told = torch_policy(stage).say({key: sample[key] for key in SEEN}, np.random.default_rng(0))
+    level, prior = stage.config.level, stage.config.prior
+    off = told - sample["target"] - base(level, prior, sample["vector"])
+    assert np.abs(off).mean() < 0.3 * np.abs(sample["target"]).mean()
+
+
+def test_what_is_beyond_the_frames_ahead_does_not_matter_to_the_encoder_of_another_sample():
+    encoder = TemporalEncoder(4, 5, TINY)
+    frames = torch.randn(6, 4, 5)
+    together = encoder(frames)
+    torch.testing.assert_close(together[2:3], encoder(frames[2:3]))
+
+
+def test_scales_are_taken_back():
+    scale = SaidScale(3)
+    values = np.random.default_rng(0).standard_t(2, (5000, 3)) * [1e-3, 0.1, 2.0]
+    scale.fit(values)
+    inside = torch.from_numpy(values[:200]).float()
+    scaled = scale(inside)
+    assert scaled.abs().max() <= 1
+    kept = scaled.abs() < 1
+    torch.testing.assert_close(scale.undo(scaled)[kept], inside[kept], rtol=1e-3, atol=1e-6)
+
+
+def test_columns_that_never_change_do_no_harm(clips):
+    stage, sample = a_stage(clips, "low-diff")
+    sample["vector"][:, -1] = 0.25
+    stage.fit_scales(sample)
+    sample["vector"][:, -1] = 0.26
+    _, vector = stage.seen(*(torch.from_numpy(sample[key]) for key in SEEN))
+    assert vector[:, -1].abs().max() < 1
+
+
+@pytest.mark.parametrize("content", [b"", b"not a network", None])
+def test_a_file_that_is_no_stage_is_refused(clips, tmp_path, content):
+    path = tmp_path / "stage.onnx"
+    if content is None:
+        stage, _ = a_stage(clips, "bc-mse")
+        export_stage(stage, "bc-mse", path)
+        content = path.read_bytes()[: path.stat().st_size // 2]
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="damaged"):
+        load_policy(path)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="does not exist"):
+        load_policy(tmp_path / "stage.onnx")

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pianomime.generalist.features import base, octave, rest_tips
+from pianomime.learn.generalist.config import STAGES, stage_config
+from pianomime.learn.generalist.windows import Windows
+
+
+def windows(clips, stage, **changes):
+    return Windows.of(clips, replace(stage_config(stage), tip_noise=0.0, **changes))
+
+
+def said(made, sample):
+    """What should be said, no longer relative to anything."""
+    return sample["target"] + base(made.config.level, made.config.prior, sample["vector"])
+
+
+def test_no_sample_crosses_a_clip(clips):
+    made = windows(clips, "high-diff")
+    sample = made._relative(made._sample(np.array([28, 36, 56]), np.zeros(3, int)))
+    goal = sample["goal"]
+    np.testing.assert_array_equal(goal[0, :2], clips.columns["goal"][28:30])
+    assert not goal[0, 2:].any()
+    assert not goal[1:, 1:].any()
+    tips = said(made, sample).reshape(3, 4, 2, 6, 3)
+    for row, last in enumerate((29, 36, 56)):
+        np.testing.assert_allclose(tips[row, -1], clips.columns["fingertips"][last], atol=1e-6)
+
+
+def test_a_clip_begins_at_rest(clips):
+    made = windows(clips, "high-diff")
+    for first in (0, 30, 37):
+        np.testing.assert_allclose(made.tips[first], rest_tips(), atol=1e-6)
+    np.testing.assert_array_equal(made.tips[1], clips.columns["fingertips"][0])
+
+
+@pytest.mark.parametrize("stage", ["low-diff", "low-diff-res", "one-stage-diff", "bc-mse"])
+def test_controls_are_those_of_the_clip(clips, stage):
+    made = windows(clips, stage)
+    rows = np.array([3, 40])
+    sample = made._relative(made._sample(rows, np.zeros(2, int)))
+    ahead = rows[:, None] + np.arange(made.config.chunk)
+    wanted = clips.columns["action"][ahead]
+    if made.config.prior:
+        wanted = wanted - clips.columns["prior"][ahead]
+    np.testing.assert_allclose(said(made, sample), wanted, atol=1e-6)
+
+
+def test_an_octave_up_everything_is_an_octave_up(clips):
+    made = windows(clips, "low-diff")
+    rows = np.array([5, 45])
+    here, up = (made._sample(rows, np.full(2, by)) for by in (0, 1))
+    np.testing.assert_array_equal(np.roll(here["goal"], 12, axis=-1), up["goal"])
+    off = (up["frames"] - here["frames"]).reshape(2, 4, 2, 12, 3)
+    # Targets move; how far they are from the fingertips stays.
+    np.testing.assert_allclose(off[:, :, 0, :, 1], octave(), atol=1e-6)
+    np.testing.assert_allclose(off[:, :, 1], 0, atol=1e-6)
+    moved = up["target"] - here["target"]
+    np.testing.assert_allclose(moved[..., [20, 43]], -octave(), atol=1e-6)
+    np.testing.assert_allclose(np.delete(moved, [20, 43], axis=-1), 0, atol=1e-6)
+    # What holds the pose moves with it: what is learned is the same.
+    np.testing.assert_allclose(
+        made._relative(here)["target"], made._relative(up)["target"], atol=1e-5
+    )
+
+
+def test_what_would_leave_the_keyboard_stays(clips):
+    clips.columns["goal"][10, 5] = True
+    made = windows(clips, "high-diff")
+    sample = made._sample(np.array([10]), np.array([-1]))
+    clips.columns["goal"][10, 5] = False
+    assert sample["goal"][0, 0, 5]
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_the_same_seed_draws_the_same(clips, stage):
+    made = Windows.of(clips, stage_config(stage))
+    first, again, other = (made.draw(np.random.default_rng(seed), 8) for seed in (1, 1, 2))
+    for name in first:
+        np.testing.assert_array_equal(first[name], again[name])
+    assert not np.array_equal(first["target"], other["target"])
+
+
+def test_no_song_is_on_both_sides_of_the_split(clips):
+    many = replace(clips, song=np.array([1, 1, 2]))
+    learned, held = many.split()
+    assert not set(learned.song.tolist()) & set(held.song.tolist())
+    assert len(learned) + len(held) == 3
