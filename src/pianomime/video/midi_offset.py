@@ -15,7 +15,7 @@ from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
 from pianomime.video.key_light import LIT, Glow, unattended
 from pianomime.video.light_record import LightRecord
-from pianomime.video.stretches import RATE
+from pianomime.video.rate import RATE
 from pianomime.video.touch import touching
 
 _MATCH = 0.7

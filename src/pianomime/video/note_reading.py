@@ -12,7 +12,7 @@ from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
 from pianomime.video.key_light import LIT, ZONES, Glow, unattended
 from pianomime.video.light_record import LightRecord
-from pianomime.video.stretches import RATE
+from pianomime.video.rate import RATE
 from pianomime.video.touch import touching
 
 _TOUCHED = np.exp(-1.0)

@@ -31,8 +31,9 @@ from pianomime.video.note_reading import read_notes
 from pianomime.video.parallax import without_parallax
 from pianomime.video.plane import Plane
 from pianomime.video.points import read_points
+from pianomime.video.rate import RATE
 from pianomime.video.sightings import Sightings
-from pianomime.video.stretches import RATE, stretches
+from pianomime.video.stretches import stretches
 
 Tell = Callable[[str, int, int], None]
 
