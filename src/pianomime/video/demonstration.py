@@ -15,8 +15,8 @@ from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.music import Score
 from pianomime.plan import NO_KEY, FingertipPlan
+from pianomime.video.rate import RATE
 
-_RATE = 20.0
 _VERSION = 1
 _SCORE = ("key", "onset", "offset", "velocity", "pedal")
 _PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
@@ -66,10 +66,10 @@ class Demonstration:
             )
         score = self.score
         sounding = np.maximum(score.onset[score.offset > start], start)
-        first = int(np.floor((sounding.min() if len(sounding) else start) * _RATE))
-        last = min(first + seconds * _RATE, float(score.frames()))
+        first = int(np.floor((sounding.min() if len(sounding) else start) * RATE))
+        last = min(first + seconds * RATE, float(score.frames()))
         end = int(last)
-        begins, ends = first / _RATE, max(end, first + 1) / _RATE
+        begins, ends = first / RATE, max(end, first + 1) / RATE
         inside = (score.onset < ends) & ((score.offset > begins) | (score.onset >= begins))
         onset = np.maximum(score.onset[inside], begins) - begins
         part = on_grid(score.clip(begins, ends))
@@ -161,8 +161,8 @@ def on_grid(score: Score) -> Score:
     """
 
     def snap(times: NDArray[np.float64]) -> NDArray[np.float64]:
-        frame = np.rint(times * _RATE)
-        return np.where(np.abs(times * _RATE - frame) < 1e-5, frame / _RATE, times)
+        frame = np.rint(times * RATE)
+        return np.where(np.abs(times * RATE - frame) < 1e-5, frame / RATE, times)
 
     return replace(
         score, onset=snap(score.onset), offset=snap(score.offset), pedal=snap(score.pedal)

@@ -36,7 +36,7 @@ class Drawing:
     def draw(
         self,
         picture: NDArray[np.uint8],
-        points: NDArray[np.float64],
+        points: NDArray[np.floating],
         found: NDArray[np.bool_],
         finger_key: NDArray[np.int8],
     ) -> NDArray[np.uint8]:

@@ -46,6 +46,7 @@ class HandTracks:
 
     Attributes:
         points: (T, 2, 6, 2) world x, y [m]; hands (left, right); points as in `plan.POINTS`.
+            Single precision, a tenth of a micrometre: in hours, bytes count.
         found: (T, 2) bool, hands that were seen in a frame; the others are filled in. A hand that
             is hardly ever seen (`FEWEST`) is taken for a ghost: it is never found, and made up.
         mended: (T, 2, 6) bool, points that were seen but wrongly, and filled in.
@@ -53,7 +54,7 @@ class HandTracks:
         swaps: number of frames in which MediaPipe took left for right.
     """
 
-    points: NDArray[np.float64]
+    points: NDArray[np.float32]
     found: NDArray[np.bool_]
     mended: NDArray[np.bool_]
     ghosts: int
@@ -68,7 +69,7 @@ class HandTracks:
         """(2,) hands that are there; the others are made up and play nothing."""
         return np.asarray(self.found.any(axis=0))
 
-    def seen_points(self, step: int = 1) -> NDArray[np.float64]:
+    def seen_points(self, step: int = 1) -> NDArray[np.float32]:
         """(ceil(T / step), H, 6, 2) of the H hands that are there, in every step-th frame."""
         points = self.points[::step]
         return points if self.seen.all() else points[:, self.seen]
@@ -94,7 +95,7 @@ def follow(
     # In a mirror every left hand looks like a right one; who sits where tells.
     mirrored = _seen_in_mirror(seen)
     chosen = _assign(seen, mirrored)
-    points = np.full((len(seen), 2, 6, 2), np.nan)
+    points = np.full((len(seen), 2, 6, 2), np.nan, np.float32)
     ghosts = swaps = 0
     for number, (hands, pick) in enumerate(zip(seen, chosen, strict=True)):
         swapped = False
@@ -111,8 +112,9 @@ def follow(
             points[:, hand], found[:, hand] = np.nan, False
     mended = np.zeros(points.shape[:3], bool)
     for hand in (LEFT, RIGHT):
-        points[:, hand], mended[:, hand] = _repair(points[:, hand], hand)
-    return HandTracks(points, found, mended & found[..., None], ghosts + doubles, swaps)
+        mended[:, hand] = _repair(points[:, hand], hand)
+    mended &= found[..., None]
+    return HandTracks(points, found, mended, ghosts + doubles, swaps)
 
 
 def _without_doubles(hands: list[Sighting]) -> list[Sighting]:
@@ -230,15 +232,13 @@ def _distance(points: NDArray[np.float64], others: NDArray[np.float64]) -> float
     return float(np.sqrt((off * off).sum(axis=1)).mean())
 
 
-def _repair(
-    points: NDArray[np.float64], hand: int
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """One hand's points (T, 6, 2): strays out, gaps filled, smoothed; and what strayed (T, 6)."""
+def _repair(points: NDArray[np.float32], hand: int) -> NDArray[np.bool_]:
+    """In one hand's points (T, 6, 2) mend strays, fill gaps, smooth; returns what strayed (T, 6)."""
     frames = len(points)
     stray = np.zeros((frames, 6), bool)
     if not np.isfinite(points).any():
-        return np.broadcast_to(at_rest(hand), points.shape).copy(), stray
-    filled = np.empty_like(points)
+        points[:] = at_rest(hand)
+        return stray
     time = np.arange(frames)
     # Point by point: hours of all of them at once take much memory.
     for point in range(6):
@@ -248,8 +248,8 @@ def _repair(
             course = np.interp(time, time[known], points[known, point, axis])
             if frames >= _SMOOTH:
                 course = savgol_filter(course, _SMOOTH, 2, mode="interp")
-            filled[:, point, axis] = course
-    return filled, stray
+            points[:, point, axis] = course
+    return stray
 
 
 def at_rest(hand: int) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
 from pianomime.video.key_light import LIT, Glow, unattended
 from pianomime.video.light_record import LightRecord
-from pianomime.video.stretches import RATE
+from pianomime.video.rate import RATE
 from pianomime.video.touch import touching
 
 _MATCH = 0.7
@@ -56,14 +56,23 @@ def estimate_offset(
         given: the offset, if it is known: then only how well it fits is found out.
     """
     points, away = tracks.seen_points(), unattended(tracks)
-    touched, counts, lags = _correlate(
-        lambda key: touching(points, key) > np.exp(-1.0), len(points), score
-    )
-    evidence, _, _ = _correlate(lambda key: touching(points, key), len(points), score)
+    onset = np.floor(score.onset * RATE + 0.5).astype(np.int64)
+    lags = np.arange(-int(onset.max()), len(points))
+    # How many notes fall within the video, for every lag.
+    counts = np.rint(fftconvolve(np.ones(len(points)), np.bincount(onset)[::-1]))
+
+    def mean(
+        value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]],
+    ) -> NDArray[np.float64]:
+        """Of the value (T,) that each key has, at the onsets of all notes within the video."""
+        return _at_onsets(value, score.key, onset, len(lags)) / np.maximum(counts, 1)
+
+    touched = mean(lambda key: touching(points, key) > np.exp(-1.0))
+    evidence = mean(lambda key: touching(points, key))
     best_light, best_peak = np.zeros(len(lags)), 0.0
     for zone, colourful in product(LIT, (True, False)):
         rise = partial(_rise, Glow(light, away, zone, colourful))
-        found, _, _ = _correlate(rise, len(points), score)
+        found = mean(rise)
         peak = float(found.max() - np.median(found))
         if peak > best_peak:
             best_light, best_peak = found, peak
@@ -89,30 +98,27 @@ def _rise(glow: Glow, key: int) -> NDArray[np.float32]:
     return np.maximum(np.diff(shine, prepend=shine[:1]), 0)
 
 
-def _correlate(
-    value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]], frames: int, score: Score
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Mean of a value at the onsets of all notes within the video, for every lag.
+def _at_onsets(
+    value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]],
+    key: NDArray[np.int64],
+    onset: NDArray[np.int64],
+    lags: int,
+) -> NDArray[np.float64]:
+    """(L,) sum of a value at the onsets of all notes, for every lag.
 
     Args:
         value: gives (T,) of a key.
-        frames: T.
-        score: the notes.
-
-    Returns:
-        The means (L,), how many notes fall within the video (L,), and the lags (L,) [frames].
+        key: (N,) of the notes.
+        onset: (N,) [frames].
+        lags: L.
     """
-    onset = np.floor(score.onset * RATE + 0.5).astype(np.int64)
-    length = int(onset.max(initial=0)) + 1
-    total = np.zeros(frames + length - 1)
-    for key in range(KEYS):
-        struck = onset[score.key == key]
+    total = np.zeros(lags)
+    for each in range(KEYS):
+        struck = onset[key == each]
         if len(struck):
-            train = np.bincount(struck, minlength=length).astype(np.float64)
-            total += fftconvolve(value(key).astype(np.float64), train[::-1])
-    counts = np.rint(fftconvolve(np.ones(frames), np.bincount(onset, minlength=length)[::-1]))
-    lags = np.arange(-(length - 1), frames)
-    return total / np.maximum(counts, 1), counts, lags
+            train = np.bincount(struck, minlength=onset.max() + 1).astype(np.float64)
+            total += fftconvolve(value(each).astype(np.float64), train[::-1])
+    return total
 
 
 def _vertex(value: NDArray[np.float64], at: int) -> float:

@@ -57,7 +57,7 @@ class NoteFingers:
 
 
 def find_note_fingers(
-    score: Score, points: NDArray[np.float64], seen: NDArray[np.bool_]
+    score: Score, points: NDArray[np.floating], seen: NDArray[np.bool_]
 ) -> NoteFingers:
     """The cheapest fingering: fingers near their keys, each on one key at a time, in order.
 
@@ -65,7 +65,7 @@ def find_note_fingers(
 
     Args:
         score: its times are those of the video.
-        points: (T, 2, 6, 2) as in `HandTracks`; T reaches to the end of the score.
+        points: (T, 2, 6, 2 or 3) world x, y and perhaps z [m]; T reaches to the end of the score.
         seen: (2,) hands that were seen.
     """
     frames = score.note_frames()
@@ -76,7 +76,8 @@ def find_note_fingers(
     until = np.zeros((1, _FINGERS), np.int64)
     since = np.full((1, _FINGERS), -1)
     on_key = np.full((1, _FINGERS), -1)
-    history: list[tuple[NDArray[np.uint8], NDArray[np.uint8]]] = []
+    # For each note and row of the beam the row and the finger before: in hours, bytes count.
+    parents, picks = np.zeros((2, len(score), _BEAM), np.uint8)
     finger = np.arange(_FINGERS)
     hand = finger // 5
     # Fingers that should lie toward the treble, and toward the bass, of each finger.
@@ -86,7 +87,7 @@ def find_note_fingers(
     below = same & (outward[None] < outward[:, None])
     thumbs = finger % 5 == 0
     price = np.where(thumbs[:, None] | thumbs[None], _THUMB_UNDER, _CROSSED)
-    for note in order:
+    for number, note in enumerate(order):
         first, end = frames[note]
         key = score.key[note]
         held = np.maximum(until - first, 0)
@@ -107,13 +108,12 @@ def find_note_fingers(
         since[row, pick] = first
         until[row, pick] = np.maximum(end, first + 1)
         on_key[row, pick] = key
-        # Both are less than 256, and there may be a hundred thousand notes.
-        history.append((parent.astype(np.uint8), pick.astype(np.uint8)))
+        parents[number, :keep], picks[number, :keep] = parent, pick
     picked = np.zeros(len(score), np.int64)
     row_now = int(np.argmin(cost))
-    for note, (parents, picks) in zip(order[::-1], reversed(history), strict=True):
-        picked[note] = picks[row_now]
-        row_now = int(parents[row_now])
+    for number in reversed(range(len(order))):
+        picked[order[number]] = picks[number, row_now]
+        row_now = int(parents[number, row_now])
     stop = _let_go(picked, frames, order)
     return NoteFingers(
         (picked // 5).astype(np.int8),
@@ -124,16 +124,15 @@ def find_note_fingers(
 
 
 def _fits(
-    score: Score, points: NDArray[np.float64], frames: NDArray[np.int64]
+    score: Score, points: NDArray[np.floating], frames: NDArray[np.int64]
 ) -> NDArray[np.float64]:
     """(N, 10) how badly each finger fits each note, at its onset and for as long as it lasts."""
-    tips = points[:, :, 1:].reshape(len(points), _FINGERS, 2)
     fit = np.empty((len(score), _FINGERS))
     for note, (first, end) in enumerate(frames.tolist()):
         # A key that is struck again at the very end sounds only after the last frame.
-        first = min(first, len(tips) - 1)
-        during = tips[first : max(end, first + 1)]
-        off = np.minimum(misfit(during, score.key[note, None]), _WORST)
+        first = min(first, len(points) - 1)
+        during = points[first : max(end, first + 1), :, 1:]
+        off = np.minimum(misfit(during, score.key[note]), _WORST).reshape(-1, _FINGERS)
         fit[note] = off[:_STRIKE].mean(axis=0) + _HOLD * off.mean(axis=0)
     return fit
 

@@ -12,7 +12,7 @@ from pianomime.music import KEYS, Score
 from pianomime.video.hand_tracks import HandTracks
 from pianomime.video.key_light import LIT, ZONES, Glow, unattended
 from pianomime.video.light_record import LightRecord
-from pianomime.video.stretches import RATE
+from pianomime.video.rate import RATE
 from pianomime.video.touch import touching
 
 _TOUCHED = np.exp(-1.0)
@@ -54,7 +54,9 @@ def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
         title: of the score.
     """
     points, away = tracks.seen_points(), unattended(tracks)
-    near = np.stack([touching(points, key) > _TOUCHED for key in range(KEYS)], axis=1)
+    near = np.empty((KEYS, len(points)), bool)
+    for key in range(KEYS):
+        near[key] = touching(points, key) > _TOUCHED
     best: tuple[float, NDArray[np.int64], bool] = (0.0, np.zeros((0, 3), np.int64), True)
     for zone, colourful, share in product(range(len(ZONES)), (True, False), _SHARES):
         glow = Glow(light, away, zone, colourful)
@@ -83,10 +85,11 @@ def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:
 
     A note lasts until it is down to half the level.
     """
-    found: list[list[tuple[int, int, int]]] = [[] for _ in _LEVELS]
+    found: list[list[NDArray[np.int64]]] = [[] for _ in _LEVELS]
     for key in range(KEYS):
         value = glow.standing_out(key, share)
-        for level, notes in zip(_LEVELS, found, strict=True):
+        for level, arrays in zip(_LEVELS, found, strict=True):
+            notes = []
             lit = np.concatenate(([False], value > level / 2, [False]))
             edges = np.flatnonzero(np.diff(lit.astype(np.int8)))
             for first, end in edges.reshape(-1, 2).tolist():
@@ -95,20 +98,21 @@ def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:
                 # It begins when it is bright, not when the glow of what comes begins.
                 bright = first + int(np.argmax(value[first:end] > level))
                 notes.append((key, bright, end))
-    return [np.array(notes, np.int64).reshape(-1, 3) for notes in found]
+            arrays.append(np.array(notes, np.int64).reshape(-1, 3))
+    return [np.concatenate(arrays) for arrays in found]
 
 
 def _touched(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(N,) whether a finger is on the key within a frame of the onset."""
+    """(N,) whether a finger is on the key, of (88, T), within a frame of the onset."""
     key, first = notes[:, 0], notes[:, 1]
-    around = [np.clip(first + step, 0, len(near) - 1) for step in (-1, 0, 1, 2)]
-    return np.asarray(np.any([near[frame, key] for frame in around], axis=0))
+    around = [np.clip(first + step, 0, near.shape[1] - 1) for step in (-1, 0, 1, 2)]
+    return np.asarray(np.any([near[key, frame] for frame in around], axis=0))
 
 
 def _worth(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> float:
     touched = _touched(notes, near)
     # Glow that spills over looks like a note beside a note at the same time.
-    order = np.lexsort((notes[:, 1], notes[:, 0]))
-    at = {(key, first) for key, first, _ in notes[order].tolist()}
-    spilt = sum((key + 1, first + late) in at for key, first in at for late in (-1, 0, 1))
+    beside = near.shape[1] + 2  # wider than the video: a frame late or early is on the same key
+    at = notes[:, 0] * beside + notes[:, 1]
+    spilt = sum(int(np.isin(at + beside + late, at).sum()) for late in (-1, 0, 1))
     return float(touched.sum() - _FALSE * (~touched).sum() - _FALSE * spilt)

@@ -13,8 +13,8 @@ import numpy as np
 from pianomime.files import atomic
 from pianomime.plan import NO_KEY
 from pianomime.video.drawing import Drawing
+from pianomime.video.rate import RATE
 from pianomime.video.retarget import Retargeted
-from pianomime.video.stretches import RATE
 
 
 def write_overlay(

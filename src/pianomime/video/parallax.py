@@ -7,8 +7,6 @@ finger that plays a key is over it.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,29 +22,20 @@ _MOST_SHIFT = 0.008
 _MOST_STRETCH = 0.05
 
 
-class Straight(NamedTuple):
-    """Points without parallax.
-
-    Attributes:
-        points: (T, 2, 6, 2) world x, y [m].
-        millimetres: by how much the fingers that play were moved, in the middle of all cases.
-    """
-
-    points: NDArray[np.float64]
-    millimetres: float
-
-
-def without_parallax(points: NDArray[np.float64], score: Score, fingers: NoteFingers) -> Straight:
+def take_back_parallax(points: NDArray[np.float64], score: Score, fingers: NoteFingers) -> float:
     """Take back a shift and a stretch along the keyboard, where the notes tell them.
 
     Args:
-        points: (T, 2, 6, 2) as in `HandTracks`.
+        points: (T, 2, 6, 2 or 3) world x, y and perhaps z [m]; changed in place.
         score: its times are those of the points.
         fingers: who seems to have played each note.
+
+    Returns:
+        By how many millimetres the fingers that play were moved, in the middle of all cases.
     """
     sure = np.flatnonzero(~fingers.guessed)
     if len(sure) < _FEWEST:
-        return Straight(points, 0.0)
+        return 0.0
     frame = np.minimum(score.note_frames()[sure, 0] + 1, len(points) - 1)
     seen = points[frame, fingers.hand[sure], fingers.finger[sure] + 1, 1]
     off = seen - key_centres()[score.key[sure], 1]
@@ -61,7 +50,6 @@ def without_parallax(points: NDArray[np.float64], score: Score, fingers: NoteFin
             slopes = (off[one] - off[two])[apart] / (seen[one] - seen[two])[apart]
             stretch = float(np.clip(np.median(slopes), -_MOST_STRETCH, _MOST_STRETCH))
     shift = float(np.clip(np.median(off - stretch * seen), -_MOST_SHIFT, _MOST_SHIFT))
-    straight = points.copy()
-    moved = shift + stretch * points[..., 1]
-    straight[..., 1] -= moved
-    return Straight(straight, float(np.median(np.abs(shift + stretch * seen))) * 1000)
+    points[..., 1] *= 1 - stretch
+    points[..., 1] -= shift
+    return float(np.median(np.abs(shift + stretch * seen))) * 1000

@@ -25,7 +25,6 @@ from pianomime.video.hand_tracks import at_rest
 from pianomime.video.strays import strays
 from pianomime.world.figures import key_centres
 
-_RATE = 20.0
 _ON_KEY = 0.005
 """[m] along the keyboard from the middle of a key, within which a finger at z = 0 presses it."""
 _NEVER_SEEN = 0.1

@@ -16,7 +16,7 @@ from pianomime.errors import InputError
 from pianomime.music import Score
 from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import LEFT, RIGHT
-from pianomime.video.align import Rule, align
+from pianomime.video.align import Rule, align, raised
 from pianomime.video.demonstration import Demonstration, on_grid
 from pianomime.video.film import Film
 from pianomime.video.hand_detector import HandDetector
@@ -28,11 +28,12 @@ from pianomime.video.light_record import LightRecord
 from pianomime.video.midi_offset import Offset, estimate_offset
 from pianomime.video.note_fingers import NoteFingers, find_note_fingers
 from pianomime.video.note_reading import read_notes
-from pianomime.video.parallax import without_parallax
+from pianomime.video.parallax import take_back_parallax
 from pianomime.video.plane import Plane
 from pianomime.video.points import read_points
+from pianomime.video.rate import RATE
 from pianomime.video.sightings import Sightings
-from pianomime.video.stretches import RATE, stretches
+from pianomime.video.stretches import stretches
 
 Tell = Callable[[str, int, int], None]
 
@@ -129,6 +130,7 @@ def retarget(
         sightings = _watch(film, readers, lights, model, tell)
         tell("notes", 0, 0)
         best, tracks, offset = _best_way(sightings, size, planes, lights, score, config.offset)
+        del sightings  # what is no longer needed goes: hours of it take much memory
         plane, light = planes[best], lights[best]
         if ways:
             seen = ways[best].describe()
@@ -143,13 +145,12 @@ def retarget(
         if len(tracks) == _MOST_FRAMES:
             remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
         score, facts = _score(film, score, offset, tracks, light, config, remarks)
-    del sightings
-    frames = score.frames()
-    points = _rows(tracks.points, frames)
-    fingers = find_note_fingers(score, points, tracks.seen)
-    straight = without_parallax(points, score, fingers)
-    fingers = find_note_fingers(score, straight.points, tracks.seen)
-    plan = align(score, straight.points, fingers, config.align)
+    # These become the plan, and are worked on in place.
+    fingertips = raised(tracks.points, score.frames())
+    fingers = find_note_fingers(score, fingertips, tracks.seen)
+    parallax = take_back_parallax(fingertips, score, fingers)
+    fingers = find_note_fingers(score, fingertips, tracks.seen)
+    plan = align(score, fingertips, fingers, config.align)
     if fingers.guessed.any():
         remarks.append(
             f"{int(fingers.guessed.sum())} of {len(score)} notes have no finger near their key: "
@@ -172,7 +173,7 @@ def retarget(
         "left_right_swaps": tracks.swaps,
         "notes": len(score),
         "notes_guessed": int(fingers.guessed.sum()),
-        "parallax_millimetres": round(straight.millimetres, 2),
+        "parallax_millimetres": round(parallax, 2),
         "align": config.align,
         **facts,
         "remarks": remarks,
@@ -322,10 +323,3 @@ def _score(
         "notes_touched": round(offset.touched, 4),
         "notes_touched_by_chance": round(offset.by_chance, 4),
     }
-
-
-def _rows(points: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
-    """As many rows as frames: the last one is held, or what is too much left out."""
-    if frames <= len(points):
-        return points[:frames]
-    return np.pad(points, ((0, frames - len(points)), (0, 0), (0, 0), (0, 0)), "edge")

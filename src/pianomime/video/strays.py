@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def strays(points: NDArray[np.float64], far: float) -> NDArray[np.bool_]:
+def strays(points: NDArray[np.floating], far: float) -> NDArray[np.bool_]:
     """(T,) frames in which a point (T, 2) is elsewhere than just before and after.
 
     Args:

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
-RATE = 20.0
-"""Frames a second."""
+from pianomime.video.rate import RATE
 
 _SHORTEST = 0.5
 """[s]"""

@@ -16,8 +16,8 @@ from PIL import Image
 from pianomime.files import atomic
 from pianomime.plan import LEFT, RIGHT
 from pianomime.video.drawing import HAND_COLOURS, Drawing
+from pianomime.video.rate import RATE
 from pianomime.video.retarget import Retargeted
-from pianomime.video.stretches import RATE
 
 _PICTURES = 3
 

@@ -19,11 +19,11 @@ _BLOCK = 10_000
 """Frames."""
 
 
-def misfit(points: NDArray[np.float64], key: NDArray[np.int64] | np.int64) -> NDArray[np.float64]:
+def misfit(points: NDArray[np.floating], key: NDArray[np.int64] | np.int64) -> NDArray[np.float64]:
     """How badly fingertips fit keys, in squares of about a third of a key's width.
 
     Args:
-        points: (..., 2) world x, y [m].
+        points: (..., 2) world x, y [m]; a z behind them does no harm.
         key: keys, of a shape that goes with (...).
     """
     beside = np.maximum(np.abs(points[..., 1] - key_centres()[key, 1]) - _FREE, 0.0)
@@ -32,7 +32,7 @@ def misfit(points: NDArray[np.float64], key: NDArray[np.int64] | np.int64) -> ND
     return np.asarray((beside / _NEAR) ** 2 + (before / _NEAR) ** 2)
 
 
-def touching(points: NDArray[np.float64], key: int) -> NDArray[np.float32]:
+def touching(points: NDArray[np.floating], key: int) -> NDArray[np.float32]:
     """(T,) how well the best of all fingertips fits a key, 0..1.
 
     Args:
