@@ -58,9 +58,10 @@ COMMANDS = {
         "pianomime.commands.train_experts", "TrainExperts", "train experts of many songs"
     ),
     "collect": Command("pianomime.commands.collect", "Collect", "make a data set of experts"),
-    "train": Command(
-        "pianomime.commands.train", "Train", "train a network that plays every song"
+    "train-goal": Command(
+        "pianomime.commands.train_goal", "TrainGoal", "train what tells players their goals"
     ),
+    "train": Command("pianomime.commands.train", "Train", "train a network that plays every song"),
     "explain": Command("pianomime.commands.explain", "Explain", "say why notes went wrong"),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }

@@ -56,5 +56,5 @@ def find_songs(names: Iterable[str | Path]) -> list[Path]:
             raise InputError(f"{path}: no MIDI files in this folder")
         found.update(dict.fromkeys(inside))
     if not found:
-        raise InputError("no songs to evaluate")
+        raise InputError("no songs")
     return list(found)

@@ -57,6 +57,11 @@ def test_a_network_that_knows_the_answer_is_believed():
     truth = np.clip(TABLE[:3], -1, 1)
     for steps in (1, 7, 100):
         found = take_noise_off(
-            lambda noisy, step: truth, NOISE, STEPS, "sample", Sampler(steps), np.random.default_rng()
+            lambda noisy, step: truth,
+            NOISE,
+            STEPS,
+            "sample",
+            Sampler(steps),
+            np.random.default_rng(),
         )
         np.testing.assert_allclose(found, truth, atol=1e-6)

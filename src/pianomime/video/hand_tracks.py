@@ -105,12 +105,12 @@ def follow(
                 swapped |= ((hands[which].right > 0.5) != (hand == RIGHT)) != mirrored
         swaps += swapped
         ghosts += len(hands) - sum(which >= 0 for which in pick)
-    found = np.isfinite(points).all(axis=(2, 3))
+    found: NDArray[np.bool_] = np.asarray(np.isfinite(points).all(axis=(2, 3)))
     for hand in (LEFT, RIGHT):
         if found[:, hand].mean() < FEWEST:
             ghosts += int(found[:, hand].sum())
             points[:, hand], found[:, hand] = np.nan, False
-    mended = np.zeros(points.shape[:3], bool)
+    mended: NDArray[np.bool_] = np.zeros(points.shape[:3], bool)
     for hand in (LEFT, RIGHT):
         mended[:, hand] = _repair(points[:, hand], hand)
     mended &= found[..., None]
@@ -233,7 +233,7 @@ def _distance(points: NDArray[np.float64], others: NDArray[np.float64]) -> float
 
 
 def _repair(points: NDArray[np.float32], hand: int) -> NDArray[np.bool_]:
-    """In one hand's points (T, 6, 2) mend strays, fill gaps, smooth; returns what strayed (T, 6)."""
+    """In one hand's points (T, 6, 2) mend strays, fill gaps, smooth; what strayed (T, 6)."""
     frames = len(points)
     stray = np.zeros((frames, 6), bool)
     if not np.isfinite(points).any():

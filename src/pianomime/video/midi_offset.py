@@ -65,7 +65,7 @@ def estimate_offset(
         value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]],
     ) -> NDArray[np.float64]:
         """Of the value (T,) that each key has, at the onsets of all notes within the video."""
-        return _at_onsets(value, score.key, onset, len(lags)) / np.maximum(counts, 1)
+        return np.asarray(_at_onsets(value, score.key, onset, len(lags)) / np.maximum(counts, 1))
 
     touched = mean(lambda key: touching(points, key) > np.exp(-1.0))
     evidence = mean(lambda key: touching(points, key))

@@ -92,7 +92,9 @@ def test_onnx_says_what_torch_says(clips, name, tmp_path):
     np.testing.assert_allclose(ours, theirs, atol=2e-4)
 
 
-@pytest.mark.parametrize(("name", "steps"), [("high-diff", 250), ("high-bet", 150), ("bc-mse", 150)])
+@pytest.mark.parametrize(
+    ("name", "steps"), [("high-diff", 250), ("high-bet", 150), ("bc-mse", 150)]
+)
 def test_it_learns_a_clip_by_heart(clips, name, steps):
     stage, sample = a_stage(clips, name, diffusion=TINY)
     stage.fit_scales(sample)

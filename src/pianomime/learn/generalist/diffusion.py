@@ -15,7 +15,7 @@ from pianomime.learn.generalist.unet import ConditionalUnet, TemporalEncoder
 
 def noise_schedule(config: DiffusionConfig) -> Any:
     """How much noise there is at each step, a `DDPMScheduler`."""
-    return DDPMScheduler(  # type: ignore[no-untyped-call]
+    return DDPMScheduler(
         num_train_timesteps=config.steps,
         beta_schedule="squaredcos_cap_v2",
         prediction_type=config.prediction,

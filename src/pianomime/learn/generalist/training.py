@@ -59,7 +59,7 @@ def train_stage(
     if config.code == "sdf":
         if goal is None:
             raise InputError(f"{name} needs a goal encoder (--goal): `pianomime train-goal`")
-        from pianomime.learn.goal import load_encoder
+        from pianomime.learn.goal.training import load_encoder
 
         encoder = load_encoder(goal)
     learned, held = (Windows.of(some, config) for some in clips.split())

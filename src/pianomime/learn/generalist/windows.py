@@ -124,7 +124,7 @@ class Windows:
         self, rows: NDArray[np.int64], goal: NDArray[np.bool_], octaves: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         """The octaves (B,) by which each sample can be moved."""
-        used: NDArray[np.bool_] = goal.any(axis=1)
+        used = np.asarray(goal.any(axis=1))
         if self.config.level != "high":
             used = used | (self.clips.columns["keys"][rows] > 0)
         low, high = used[:, :_OCTAVE].any(axis=1), used[:, KEYS - _OCTAVE :].any(axis=1)
@@ -134,7 +134,7 @@ class Windows:
             low_end, high_end = _slide_ends()
             action = _slid(self.clips.columns["action"][rows], octaves * octave(), _SLIDE_CONTROLS)
             slides = action[:, _SLIDE_CONTROLS]
-            beyond = ((slides < low_end) | (slides > high_end)).any(axis=1)
+            beyond |= ((slides < low_end) | (slides > high_end)).any(axis=1)
         return np.where(off_keys | beyond, 0, octaves)
 
 
