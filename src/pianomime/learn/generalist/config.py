@@ -81,7 +81,10 @@ class StageConfig:
     transpose: bool = True
     """Whether samples are moved by octaves by chance."""
     tip_noise: float = 0.0
-    """[m] Noise that is added to present fingertips in training."""
+    """[m] Noise that is added to each present fingertip in training."""
+    hand_noise: float = 0.0
+    """[m] Noise along the keyboard that is added to whole hands in training: from where they have
+    strayed to they learn to come back."""
     diffusion: DiffusionConfig = field(default_factory=DiffusionConfig)
     bet: BetConfig = field(default_factory=BetConfig)
     mlp: MlpConfig = field(default_factory=MlpConfig)
@@ -93,12 +96,14 @@ class StageConfig:
         return 1 if self.network == "mlp" else CHUNK
 
 
-_NOISE = 0.01
+_TIPS, _HANDS = 0.01, 0.06
 
 _STAGES: dict[StageName, StageConfig] = {
-    "high-diff": StageConfig("high", "diffusion", tip_noise=_NOISE),
-    "high-diff-no-sdf": StageConfig("high", "diffusion", "binary", tip_noise=_NOISE),
-    "high-bet": StageConfig("high", "bet", tip_noise=_NOISE),
+    "high-diff": StageConfig("high", "diffusion", tip_noise=_TIPS, hand_noise=_HANDS),
+    "high-diff-no-sdf": StageConfig(
+        "high", "diffusion", "binary", tip_noise=_TIPS, hand_noise=_HANDS
+    ),
+    "high-bet": StageConfig("high", "bet", tip_noise=_TIPS, hand_noise=_HANDS),
     "low-diff": StageConfig("low", "diffusion"),
     "low-diff-no-sdf": StageConfig("low", "diffusion", "binary"),
     "low-diff-res": StageConfig("low", "diffusion", prior=True),

@@ -64,9 +64,10 @@ class Windows:
         rows = draw.integers(0, len(self), batch)
         shift = draw.integers(-1, 2, batch) if self.config.transpose else np.zeros(batch, np.int64)
         sample = self._sample(rows, shift)
-        if self.config.tip_noise:
-            noise = draw.normal(0.0, self.config.tip_noise, (batch, TIPS))
-            sample["vector"][:, :TIPS] += noise.astype(np.float32)
+        if self.config.level == "high":
+            noise = draw.normal(0.0, self.config.tip_noise, (batch, 2, 6, 3))
+            noise[..., 1] += draw.normal(0.0, self.config.hand_noise, (batch, 2, 1))
+            sample["vector"] += noise.reshape(batch, TIPS).astype(np.float32)
         return self._relative(sample)
 
     def some(self, number: int) -> Arrays:
