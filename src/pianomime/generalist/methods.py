@@ -17,9 +17,8 @@ METHODS: dict[str, tuple[str, ...]] = {
     "two-stage-bet": ("high-bet", "low-bet"),
     "one-stage-diff": ("one-stage-diff",),
     "bc-mse": ("bc-mse",),
-    "multi-task-sac": ("multi-task-sac",),
 }
-"""The stages of each method of the paper: from goals to fingertips and on to controls, or from
+"""The stages of each method that imitates: from goals to fingertips and on to controls, or from
 goals to controls at once (appendix G)."""
 
 WEIGHTS = "PIANOMIME_WEIGHTS"

@@ -63,7 +63,7 @@ class Windows:
         """Samples by chance: each frame alike often, in a key by chance where that is asked for."""
         rows = draw.integers(0, len(self), batch)
         shift = draw.integers(-1, 2, batch) if self.config.transpose else np.zeros(batch, np.int64)
-        sample = self._sample(rows, shift)
+        sample = self._absolute(rows, shift)
         if self.config.level == "high":
             noise = draw.normal(0.0, self.config.tip_noise, (batch, 2, 6, 3))
             noise[..., 1] += draw.normal(0.0, self.config.hand_noise, (batch, 2, 1))
@@ -73,23 +73,28 @@ class Windows:
     def some(self, number: int) -> Arrays:
         """So many samples, evenly spread, as they are."""
         rows = np.linspace(0, len(self) - 1, min(number, len(self))).astype(np.int64)
-        return self._relative(self._sample(rows, np.zeros(len(rows), np.int64)))
+        return self.sample(rows, np.zeros(len(rows), np.int64))
 
-    def _relative(self, sample: Arrays) -> Arrays:
-        config = self.config
-        target = sample["target"] - base(config.level, config.prior, sample["vector"])
-        return {**sample, "target": target[:, : config.chunk].astype(np.float32)}
+    def sample(self, rows: NDArray[np.int64], octaves: NDArray[np.int64]) -> Arrays:
+        """What is given in frames (B,), and as `target` (B, T, D) what should be said.
 
-    def _sample(self, rows: NDArray[np.int64], octaves: NDArray[np.int64]) -> Arrays:
-        """What is given in frames (B,), and as `target` (B, 4, D) what should be said.
-
-        Beyond the end of a clip its last frame is held, and its goals are silence.
+        The target is relative to `base`. Beyond the end of a clip its last frame is held, and its
+        goals are silence.
 
         Args:
             rows: (B,) frames.
             octaves: (B,) by how many everything is moved up; where that leads off the keyboard, or
                 beyond what the forearms can reach, it stays.
         """
+        return self._relative(self._absolute(rows, octaves))
+
+    def _relative(self, sample: Arrays) -> Arrays:
+        config = self.config
+        target = sample["target"] - base(config.level, config.prior, sample["vector"])
+        return {**sample, "target": target[:, : config.chunk].astype(np.float32)}
+
+    def _absolute(self, rows: NDArray[np.int64], octaves: NDArray[np.int64]) -> Arrays:
+        """As `sample`, with a target that is not relative to anything."""
         columns, config = self.clips.columns, self.config
         end = self.clips.ends[np.searchsorted(self.clips.ends, rows, side="right")]
         ahead = rows[:, None] + np.arange(HIGH_GOALS if config.level == "high" else CHUNK)
