@@ -8,6 +8,7 @@ from hypothesis import given, settings
 
 from any_score import scores
 from pianomime import songs
+from pianomime.generalist.methods import METHODS
 from pianomime.music import Score
 from pianomime.play import PLAYERS, Player, excerpt
 from pianomime.world import World
@@ -15,7 +16,8 @@ from pianomime.world.figures import key_centres
 
 
 @pytest.mark.filterwarnings("ignore::pianomime.world.PhysicsWarning")
-@pytest.mark.parametrize("player", sorted(PLAYERS))
+# Those that learned have weights, and tests, of their own.
+@pytest.mark.parametrize("player", sorted({*PLAYERS} - {*METHODS}))
 @settings(max_examples=12, deadline=None)
 @given(score=scores())
 def test_any_score_is_played(player: str, score: Score) -> None:
