@@ -209,6 +209,8 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing_half_done(command: str, tmp_pat
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # What a shell starts in the background ignores Ctrl-C, and so would what that starts.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     began = time.monotonic()
     # Its temporary folder, or that of its songs, shows that it is at work.
