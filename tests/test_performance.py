@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import made_up
+import pianomime.performance
 from pianomime import Performance
 from pianomime.errors import InputError
 from pianomime.plan import FingertipPlan
@@ -43,11 +44,11 @@ def test_a_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.M
     made_up.performance(made_up.score()).save(path)
     before = path.read_bytes()
 
-    def interrupted(target: Path, **_: object) -> None:
+    def interrupted(target: Path, _: object) -> None:
         Path(target).write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(np, "savez_compressed", interrupted)
+    monkeypatch.setattr(pianomime.performance, "write_arrays", interrupted)
     with pytest.raises(KeyboardInterrupt):
         made_up.performance(made_up.score(seed=1)).save(path)
     assert path.read_bytes() == before

@@ -1,10 +1,11 @@
-"""Reading .npz files, those that we wrote among them."""
+"""Reading and writing .npz files."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 
 _Made = TypeVar("_Made")
+
+_BLOCK = 1 << 20
+"""Bytes that are compressed at once."""
 
 
 def read_arrays(path: str | os.PathLike[str], kind: str) -> dict[str, NDArray[Any]]:
@@ -66,3 +70,24 @@ def read_archive(
             f"{path}: {kind} of version {found}; this program reads {known}: make it anew"
         )
     return made
+
+
+def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write arrays to one compressed file; in small blocks, where numpy takes some 40 MiB.
+
+    Args:
+        path: where to.
+        arrays: by name; of numbers or texts.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for name, array in arrays.items():
+            array = np.asarray(array, order="C")
+            content = array.reshape(-1).view(np.uint8)
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                header = np.lib.format.header_data_from_array_1_0(array)
+                np.lib.format.write_array_header_1_0(file, header)
+                for first in range(0, len(content), _BLOCK):
+                    file.write(content[first : first + _BLOCK].data)

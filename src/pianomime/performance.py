@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.archive import read_archive
+from pianomime.archive import read_archive, write_arrays
 from pianomime.files import atomic
 from pianomime.music import Score, frame_metrics, notes_from_roll, onset_f1, pedal_f1
 from pianomime.plan import FingertipPlan
@@ -160,7 +160,7 @@ class Performance:
             for name in _PLAN:
                 arrays[f"plan_{name}"] = getattr(self.plan, name)
         with atomic(path) as temporary:
-            np.savez_compressed(temporary, allow_pickle=False, **arrays)
+            write_arrays(temporary, arrays)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Performance:
