@@ -20,6 +20,8 @@ from pianomime.video.rate import RATE
 from pianomime.video.retarget import Retargeted
 
 _PICTURES = 3
+_MOST_POINTS = 20_000
+"""Of a line: the picture has some thousand columns, and cannot show more."""
 
 _PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>$title</title>
@@ -71,10 +73,11 @@ def _timeline(made: Retargeted) -> bytes:
     figure = Figure(figsize=(12, 4.5), layout="constrained")
     hands, notes = figure.subplots(2, 1, sharex=True)
     seconds = np.arange(len(tracks)) / RATE
+    some = slice(None, None, max(1, len(tracks) // _MOST_POINTS))
     for hand, name in ((LEFT, "left"), (RIGHT, "right")):
         colour = np.array(HAND_COLOURS[hand]) / 255
         middle = tracks.points[:, hand, 1:, 1].mean(axis=1)
-        hands.plot(seconds, middle, color=colour, label=name)
+        hands.plot(seconds[some], middle[some], color=colour, label=name)
         lost = ~tracks.found[:, hand]
         hands.scatter(seconds[lost], middle[lost], color="red", s=8, zorder=3)
         mine = fingers.hand == hand
