@@ -5,8 +5,9 @@
 A minute of made-up playing (640 x 360, 20 frames/s, keys light up) over and over, with a MIDI file
 and without. In MediaPipe's place stands one who knows where the hands were drawn; what
 MediaPipe itself takes comes on top, and is not measured here. The whole keyboard is seen: where a
-part is, and a MIDI file decides the octave, each octave that it may be takes memory of its own.
-Each length has a process of its own, whose greatest resident memory is told.
+part is, and a MIDI file decides the octave, each octave that it may be takes a temporary file of
+its own. Each length has a process of its own, whose greatest resident memory is told; the video is
+made in another one before.
 """
 
 from __future__ import annotations
@@ -16,18 +17,22 @@ import resource
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 import av
 import numpy as np
+from numpy.typing import NDArray
 
 import common
 from pianomime.music import Score
 from pianomime.video import retarget as room
 from pianomime.video.overlay import write_overlay
 from pianomime.video.retarget import RetargetConfig, retarget
+from pianomime.video.sightings import Sighting
 from pianomime.video.summary import write_summary
 
 sys.path.append(str(common.ROOT / "tests" / "video"))
@@ -46,37 +51,48 @@ def main() -> None:
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for hours in given.hours:
-            for with_midi in (True, False):
-                queue: Any = multiprocessing.get_context("spawn").SimpleQueue()
-                work = multiprocessing.get_context("spawn").Process(
-                    target=_retarget, args=(Path(folder), hours, with_midi, given.overlay, queue)
-                )
-                work.start()
-                work.join()
-                if work.exitcode:
-                    raise SystemExit(f"{hours} h: exit code {work.exitcode}")
-                rows.append(queue.get())
+            _alone(_make, Path(folder), hours)
+            rows += [
+                _alone(_retarget, Path(folder), hours, with_midi, given.overlay)
+                for with_midi in (True, False)
+            ]
     common.table(list(rows[0]), [list(row.values()) for row in rows])
     common.report(given.output, facts, {"long_video": rows})
 
 
-def _retarget(folder: Path, hours: float, with_midi: bool, overlay: bool, queue: Any) -> None:
+def _alone(work: Callable[..., Any], *about: Any) -> Any:
+    """What work gives in a process of its own."""
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(work, *about).result()
+
+
+def _make(folder: Path, hours: float) -> None:
+    """Write the video, and the MIDI file of what is played in it."""
     import made_up_video as made_up
 
     score = made_up.song(LOOP)
-    plan = made_up.plan_of(score)
-    plane = made_up.camera(SIZE)
-    short, video = folder / "short.mp4", folder / f"{hours}.mp4"
+    short = folder / "short.mp4"
     if not short.exists():
-        made_up.write(short, plane, SIZE, score, plan, made_up.times(LOOP, 20))
+        plan = made_up.plan_of(score)
+        made_up.write(short, made_up.camera(SIZE), SIZE, score, plan, made_up.times(LOOP, 20))
     times = round(hours * 3600 / LOOP)
-    if not video.exists():
-        _repeat(short, video, times)
-    midi, model = folder / "song.mid", folder / "not-used.task"
-    _repeated(score, times).to_midi(midi)
+    _repeat(short, folder / f"{hours}.mp4", times)
+    _repeated(score, times).to_midi(folder / f"{hours}.mid")
+
+
+def _retarget(folder: Path, hours: float, with_midi: bool, overlay: bool) -> dict[str, Any]:
+    import made_up_video as made_up
+
+    class Hands(made_up.TrueHands):
+        """Those of a minute, over and over."""
+
+        def detect(self, picture: NDArray[np.uint8], milliseconds: int) -> list[Sighting]:
+            return super().detect(picture, milliseconds % round(1000 * LOOP))
+
+    video, midi, model = (folder / f"{hours}.mp4", folder / f"{hours}.mid", folder / "no.task")
     model.touch()
-    points = np.tile(plan.fingertips[: round(20 * LOOP), :, :, :2], (times, 1, 1, 1))
-    detector = made_up.TrueHands(plane, SIZE, points)
+    points = made_up.plan_of(made_up.song(LOOP)).fingertips[: round(20 * LOOP), :, :, :2]
+    detector = Hands(made_up.camera(SIZE), SIZE, points)
     before = _peak()
     began = time.perf_counter()
     config = RetargetConfig(midi=midi if with_midi else None, hand_model=model)
@@ -86,16 +102,14 @@ def _retarget(folder: Path, hours: float, with_midi: bool, overlay: bool, queue:
     if overlay:
         write_overlay(made, folder / "overlay.mp4")
     made.demonstration.save(folder / "demo.npz")
-    queue.put(
-        {
-            "hours": hours,
-            "notes from": "MIDI file" if with_midi else "video",
-            "notes": len(made.demonstration.score),
-            "peak memory [MiB]": _peak(),
-            "of that before it began [MiB]": before,
-            "minutes": (time.perf_counter() - began) / 60,
-        }
-    )
+    return {
+        "hours": hours,
+        "notes from": "MIDI file" if with_midi else "video",
+        "notes": len(made.demonstration.score),
+        "peak memory [MiB]": _peak(),
+        "of that before it began [MiB]": before,
+        "minutes": (time.perf_counter() - began) / 60,
+    }
 
 
 def _repeat(short: Path, video: Path, times: int) -> None:
