@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.world.figures import KEYS, key_centres
+from pianomime.world.figures import HAND_ACTUATORS, HAND_JOINTS, KEYS, key_centres
 from pianomime.world.hand import SIDES, Hand
 
 TIPS = 36
 """Numbers of both hands' points, (2, 6, 3) in a row."""
-JOINTS = 54
-CONTROLS = 46
+JOINTS = 2 * HAND_JOINTS
+CONTROLS = 2 * HAND_ACTUATORS
 
 Arrays = dict[str, NDArray[np.float32]]
 """`goal` (B, G, 88), `frames` (B, C, F) and `vector` (B, V): what a network is given."""
@@ -72,7 +72,7 @@ def low_inputs(
 @cache
 def rest_tips() -> NDArray[np.float64]:
     """(2, 6, 3) [m] where the points are at rest; read-only."""
-    tips = np.array([Hand(side).points(np.zeros(27)) for side in SIDES])
+    tips = np.array([Hand(side).points(np.zeros(HAND_JOINTS)) for side in SIDES])
     tips.setflags(write=False)
     return tips
 

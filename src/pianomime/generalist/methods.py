@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pianomime.errors import InputError
-from pianomime.generalist.player import Generalist
-from pianomime.generalist.policy import load_policy
-from pianomime.generalist.sampler import Sampler
+
+if TYPE_CHECKING:
+    from pianomime.generalist.player import Generalist
 
 METHODS: dict[str, tuple[str, ...]] = {
     "two-stage-diff": ("high-diff", "low-diff"),
@@ -25,8 +26,8 @@ WEIGHTS = "PIANOMIME_WEIGHTS"
 """Name of the environment variable that tells a folder of weights other than those that came with
 the program."""
 
-_SAMPLERS = (Sampler(5), Sampler(10), Sampler(20), Sampler(100, eta=1.0))
-"""By effort; the last one is the paper's."""
+_SAMPLERS = ((5, 0.0), (10, 0.0), (20, 0.0), (100, 1.0))
+"""Steps and eta of a `Sampler`, by effort; the last one is the paper's."""
 
 
 def make_generalist(method: str, effort: int, seed: int = 0) -> Generalist:
@@ -40,7 +41,13 @@ def make_generalist(method: str, effort: int, seed: int = 0) -> Generalist:
     Raises:
         InputError: its weights are not there, or cannot be read.
     """
-    stages = [load_policy(stage_path(stage), _SAMPLERS[effort]) for stage in METHODS[method]]
+    # Late, for every player's module asks for the names of all.
+    from pianomime.generalist.player import Generalist
+    from pianomime.generalist.policy import load_policy
+    from pianomime.generalist.sampler import Sampler
+
+    sampler = Sampler(*_SAMPLERS[effort])
+    stages = [load_policy(stage_path(stage), sampler) for stage in METHODS[method]]
     *high, low = stages
     return Generalist(low, high[0] if high else None, bool(low.about["prior"]), seed=seed)
 

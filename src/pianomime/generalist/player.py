@@ -1,7 +1,7 @@
 """A generalist plays: what it wants, and how it does it, decided anew as it goes.
 
-It is planner and tracker in one. Its plan is written while it plays, for only then is it known
-where the hands are: the high level looks at them again every frame.
+It is planner and tracker in one. Its plan is written while it plays: every frame the high level
+goes on from where it last wanted the fingertips, and the low level looks at the hands as they are.
 """
 
 from __future__ import annotations
@@ -9,12 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.generalist.features import (
-    Arrays,
-    high_inputs,
-    low_inputs,
-    rest_tips,
-)
+from pianomime.generalist.features import CONTROLS, Arrays, high_inputs, low_inputs, rest_tips
 from pianomime.generalist.horizon import CHUNK, HIGH_GOALS
 from pianomime.generalist.policy import Policy
 from pianomime.generalist.snap import snap
@@ -60,7 +55,7 @@ class Generalist:
         self._draw = np.random.default_rng(self._seed)
         self._wanted = rest_tips().copy()
         self._pressing = np.full((2, 5), NO_KEY, np.int8)
-        self._chunk = np.empty((0, 46))
+        self._chunk = np.empty((0, CONTROLS))
         if self._ik is not None:
             self._ik.begin(plan)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +28,17 @@ class Sampler:
     """Noise that is added on the way: 0 is DDIM; 1 with all steps is DDPM, as in the paper."""
 
 
+@cache
 def signal(steps: int) -> NDArray[np.float64]:
-    """(steps,) share of the signal that is left after each step, squared: the cosine schedule."""
+    """(steps,) squared share of the signal that is left after each step, by a cosine; read-only."""
 
     def level(time: float) -> float:
         return math.cos((time + 0.008) / 1.008 * math.pi / 2) ** 2
 
     beta = [min(1 - level((n + 1) / steps) / level(n / steps), 0.999) for n in range(steps)]
-    return np.asarray(np.cumprod(1.0 - np.array(beta)))
+    left: NDArray[np.float64] = np.asarray(np.cumprod(1.0 - np.array(beta)))
+    left.setflags(write=False)
+    return left
 
 
 def take_noise_off(
