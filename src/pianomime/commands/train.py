@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from pianomime.commands.named import named
 from pianomime.learn.generalist.config import STAGES, Size, StageConfig, StageName, stage_config
 
 
@@ -47,7 +48,8 @@ class Train:
     def default(cls, arguments: list[str]) -> Train:
         """What holds for arguments that are not given: that is for stage and size to say."""
         stage = next((name for name in STAGES if name in arguments), STAGES[0])
-        size: Size = "paper" if "paper" in arguments or "--size=paper" in arguments else "small"
+        # Any other is refused when the command line is parsed.
+        size: Size = "paper" if named("--size", arguments, "small") == "paper" else "small"
         return cls(stage=tyro.MISSING, config=stage_config(stage, size))
 
     def run(self) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import tyro
 
 from pianomime.commands.extras import extra
+from pianomime.commands.named import named
 from pianomime.learn.config import ExpertConfig, preset_config
 
 PresetName = Literal["paper", "best"]
@@ -45,7 +46,7 @@ class TrainExpert:
     @classmethod
     def default(cls, arguments: list[str]) -> TrainExpert:
         """What holds for arguments that are not given: that is for the preset to say."""
-        return cls(song=tyro.MISSING, config=preset_config(named_preset(arguments)))
+        return cls(song=tyro.MISSING, config=preset_config(named("--preset", arguments, "paper")))
 
     def run(self) -> None:
         """Train.
@@ -72,18 +73,3 @@ class TrainExpert:
         print(f"F1 {best['f1']:.3f} after {best['steps']} steps")
         print(f"saved: {out}")
         print(f"play it: pianomime play {self.song} --player {out}")
-
-
-def named_preset(arguments: list[str]) -> str:
-    """The preset that a command line names."""
-    for place, argument in enumerate(arguments):
-        if argument.startswith("--preset="):
-            return _known(argument.partition("=")[2])
-        if argument == "--preset" and place + 1 < len(arguments):
-            return _known(arguments[place + 1])
-    return "paper"
-
-
-def _known(name: str) -> str:
-    preset_config(name)
-    return name

@@ -10,7 +10,8 @@ from typing import Annotated
 import tyro
 
 from pianomime.commands.extras import extra
-from pianomime.commands.train_expert import PresetName, named_preset
+from pianomime.commands.named import named
+from pianomime.commands.train_expert import PresetName
 from pianomime.learn.config import ExpertConfig, preset_config
 
 
@@ -49,7 +50,7 @@ class TrainExperts:
     @classmethod
     def default(cls, arguments: list[str]) -> TrainExperts:
         """What holds for arguments that are not given: that is for the preset to say."""
-        return cls(folder=tyro.MISSING, config=preset_config(named_preset(arguments)))
+        return cls(folder=tyro.MISSING, config=preset_config(named("--preset", arguments, "paper")))
 
     def run(self) -> None:
         """Train and print.
