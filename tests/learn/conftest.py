@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pianomime.learn import tensors
 from pianomime.learn.config import (
     EnvConfig,
     EpisodeConfig,
@@ -70,3 +74,22 @@ def every_part() -> EnvConfig:
     """All parts of an observation, episodes that begin anywhere and are cut short."""
     seen = ObservationConfig(goal=3, fingertips=2, errors=True, time=True)
     return EnvConfig(observation=seen, episode=EpisodeConfig(start="anywhere", frames=7))
+
+
+@pytest.fixture
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[], AbstractContextManager[None]]:
+    """As a context: whatever checkpoint is written in it breaks off half way, as on a full disk."""
+
+    def full(path: Path, content: bytes) -> int:
+        with open(path, "wb") as file:
+            file.write(content[: len(content) // 2])
+        raise OSError(28, "No space left on device", str(path))
+
+    @contextmanager
+    def disk() -> Iterator[None]:
+        with monkeypatch.context() as patch:
+            patch.setattr(tensors.Path, "write_bytes", full)
+            with pytest.raises(OSError, match="No space left"):
+                yield
+
+    return disk

@@ -22,7 +22,6 @@ from toy_fit import CONFIG, draw, error, loss, network, stop_at, train
 
 from pianomime.errors import InputError
 from pianomime.learn import fit as fit_module
-from pianomime.learn import tensors
 from pianomime.learn.fit import learning_rate, load_weights
 from pianomime.learn.fit_config import FitConfig
 from pianomime.learn.fit_folder import FitFolder
@@ -184,22 +183,13 @@ def test_a_gradient_that_is_no_number_stops_it(tmp_path: Path) -> None:
     assert FitFolder(tmp_path / "run").state() is None
 
 
-def test_a_full_disk_leaves_the_last_good_checkpoint(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_leaves_the_last_good_checkpoint(tmp_path: Path, full_disk: Any) -> None:
     config, out = change(steps=60), tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
         train(out, config, loss=stop_at(9, KeyboardInterrupt()))
 
-    def full(path: Path, content: bytes) -> int:
-        with open(path, "wb") as file:
-            file.write(content[: len(content) // 2])
-        raise OSError(28, "No space left on device", str(path))
-
-    with monkeypatch.context() as patch:
-        patch.setattr(tensors.Path, "write_bytes", full)
-        with pytest.raises(OSError, match="No space left"):
-            train(out, config)
+    with full_disk():
+        train(out, config)
     state = FitFolder(out).state()
     assert state is not None
     assert state[1] == 8

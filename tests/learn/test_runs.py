@@ -124,22 +124,15 @@ def test_more_steps_prolong_a_run(demo: Path, tmp_path: Path, small_ppo: ExpertC
 
 
 def test_a_full_disk_leaves_the_last_good_checkpoint(
-    demo: Path, tmp_path: Path, small_ppo: ExpertConfig, monkeypatch: pytest.MonkeyPatch
+    demo: Path, tmp_path: Path, small_ppo: ExpertConfig, full_disk: Any
 ) -> None:
     out = tmp_path / "run"
     train_expert(demo, out, small_ppo, threads=1)
     before = tensors_of(RunFolder.load(out))
     longer = dataclasses.replace(small_ppo, steps=2 * small_ppo.steps)
 
-    def full(path: Path, content: bytes) -> int:
-        with open(path, "wb") as file:
-            file.write(content[: len(content) // 2])
-        raise OSError(28, "No space left on device", str(path))
-
-    with monkeypatch.context() as patch:
-        patch.setattr(tensors.Path, "write_bytes", full)
-        with pytest.raises(OSError, match="No space left"):
-            train_expert(demo, out, longer, threads=1)
+    with full_disk():
+        train_expert(demo, out, longer, threads=1)
     assert tensors_of(RunFolder.load(out)) == before
     assert not [name for name in os.listdir(out) if name.startswith(".")]
     assert train_expert(demo, out, longer, threads=1).steps_done == longer.steps
