@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pianomime import Player
+from pianomime.errors import InputError
+from pianomime.generalist.methods import WEIGHTS
+from pianomime.learn.episode import COLUMNS, Episode
+from pianomime.learn.expert_data import write_expert_data
+from pianomime.learn.fit_config import FitConfig
+from pianomime.learn.generalist.config import DiffusionConfig, stage_config
+from pianomime.learn.generalist.training import train_stage
+from pianomime.learn.goal.config import GoalConfig
+from pianomime.learn.goal.training import train_goal
+from pianomime.video.demonstration import Demonstration
+
+SHORT = FitConfig(steps=4, batch=8, warmup=1)
+TINY = DiffusionConfig(channels=(8, 8, 16), condition=16, step_width=8)
+
+
+@pytest.fixture(scope="module")
+def data(two_notes: Demonstration, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Demonstrations and episodes of fifteen songs, and a goal encoder of two."""
+    folder = tmp_path_factory.mktemp("data")
+    demos, songs = folder / "demos", folder / "songs"
+    demos.mkdir()
+    songs.mkdir()
+    for number in range(15):
+        two_notes.save(demos / f"{number:02d}.npz")
+    for number in range(2):
+        moved = replace(two_notes.score, key=two_notes.score.key + number)
+        moved.to_midi(songs / f"{number}.mid")
+    draw = np.random.default_rng(0)
+    frames = len(two_notes.plan)
+    columns = {
+        name: draw.normal(0, 0.1, (frames, *column.shape)).astype(column.dtype)
+        for name, column in COLUMNS.items()
+    }
+    columns["goal"] = two_notes.score.roll()
+    columns["fingertips"] = two_notes.plan.fingertips.astype(np.float32)
+    columns["keys"] = columns["goal"].astype(np.float32)
+    episodes = (Episode(str(number), 1.0, "ik", columns, number) for number in range(15))
+    write_expert_data(folder / "experts.zarr", episodes)
+    config = GoalConfig(fit=replace(SHORT, bfloat16=False))
+    train_goal([songs], folder / "goal", config, lambda *_: None, lambda *_: None)
+    return folder
+
+
+def train(name, data, out, **changes):
+    config = replace(stage_config(name), diffusion=TINY, fit=SHORT, **changes)
+    return train_stage(name, config, out, data / "demos", data / "experts.zarr", data / "goal")
+
+
+@pytest.mark.parametrize("low", ["low-diff", "low-diff-res"])
+def test_what_was_trained_plays(data, two_notes, tmp_path, monkeypatch, low):
+    """With codes of goals: data, goal encoder, training, export, playing."""
+    for stage in ("high-diff", low):
+        assert train(stage, data, tmp_path) == tmp_path / f"{stage}.onnx"
+    monkeypatch.setenv(WEIGHTS, str(tmp_path))
+    player = Player.from_name("two-stage-diff-res" if low.endswith("res") else "two-stage-diff", 0)
+    first, again = (player.play(two_notes.score) for _ in range(2))
+    assert np.isfinite(first.ctrl).all()
+    np.testing.assert_array_equal(first.ctrl, again.ctrl)
+
+
+def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
+    first = train("high-diff-no-sdf", data, tmp_path).read_bytes()
+    weights = tmp_path / "high-diff-no-sdf" / "weights.safetensors"
+    written = weights.stat().st_mtime_ns
+    assert train("high-diff-no-sdf", data, tmp_path).read_bytes() == first
+    assert weights.stat().st_mtime_ns == written
+    with pytest.raises(InputError, match="tip_noise"):
+        train("high-diff-no-sdf", data, tmp_path, tip_noise=0.5)
+
+
+def test_what_is_missing_is_named(data, tmp_path):
+    config = replace(stage_config("high-diff"), fit=SHORT)
+    with pytest.raises(InputError, match="--demonstrations"):
+        train_stage("high-diff", config, tmp_path, None, None, None)
+    with pytest.raises(InputError, match="--experts"):
+        train_stage("low-diff", stage_config("low-diff"), tmp_path, None, None, None)
+    with pytest.raises(InputError, match="does not exist"):
+        train_stage("high-diff", config, tmp_path, data / "demos", None, tmp_path / "none")
+    with pytest.raises(InputError, match="nothing to train on"):
+        train_stage("high-diff", config, tmp_path, tmp_path, None, None)
+
+
+def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):
+    columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    columns["joints"][2] = np.nan
+    write_expert_data(tmp_path / "odd.zarr", iter([Episode("odd", 0.0, "ik", columns)]))
+    with pytest.raises(InputError, match="joints of odd"):
+        train_stage("bc-mse", stage_config("bc-mse"), tmp_path, None, tmp_path / "odd.zarr", None)
