@@ -131,23 +131,20 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         fits = arrays["length"].shape == arrays["clip_id"].shape
         if not fits or arrays["length"].sum() != len(arrays[column]):
             raise InputError(f"{path}: the lengths of the clips do not add up")
-    clips = human["clip_id"].tolist()
-    songs = dict(zip(clips, human.get("song_group", np.full(len(clips), -1)).tolist(), strict=True))
-    splits = dict(
-        zip(clips, human.get("split", np.full(len(clips), "train")).tolist(), strict=True)
-    )
-    human_ends = dict(zip(human["clip_id"].tolist(), np.cumsum(human["length"]), strict=True))
-    human_lengths = dict(zip(human["clip_id"].tolist(), human["length"], strict=True))
+    place = {clip: row for row, clip in enumerate(human["clip_id"].tolist())}
+    human_ends = np.cumsum(human["length"])
+    song = human.get("song_group", np.full(len(place), -1))
+    split = human.get("split", np.full(len(place), "train"))
     ends = np.cumsum(recorded["length"])
     for clip, end, length in zip(
         recorded["clip_id"].tolist(), ends, recorded["length"], strict=True
     ):
-        if clip not in human_ends:
+        if clip not in place:
             raise InputError(f"{demonstrations}: has no clip {clip}")
-        if human_lengths[clip] != length:
+        if human["length"][place[clip]] != length:
             raise InputError(f"{demonstrations}: clip {clip} is not as long as in {experts}")
         rows = slice(end - length, end)
-        theirs = slice(human_ends[clip] - length, human_ends[clip])
+        theirs = slice(human_ends[place[clip]] - length, human_ends[place[clip]])
         columns = _empty(int(length))
         columns["joints"][:] = world_order(recorded["qpos_1e4"][rows] / 1e4)
         columns["velocities"][:] = world_order(recorded["qvel_500"][rows] / 500.0)
@@ -164,7 +161,8 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         _fill(columns, goal, tips, finger_key)
         f1 = frame_metrics(goal, columns["pressed"]).f1
         name = f"clip{clip:03d}"
-        yield Episode(name, f1, "ik", columns, songs[clip], splits[clip]), len(ends)
+        of_song, part = int(song[place[clip]]), str(split[place[clip]])
+        yield Episode(name, f1, "ik", columns, of_song, part), len(ends)
 
 
 def world_order(recorded: NDArray[np.float64]) -> NDArray[np.float64]:

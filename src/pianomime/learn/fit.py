@@ -106,7 +106,7 @@ def load_weights(folder: Path, module: nn.Module) -> None:
         InputError: nothing was trained to the end there, or a network of another shape, or the
             file is damaged.
     """
-    _load(module, FitFolder(folder).weights()[0], folder)
+    load_arrays(module, FitFolder(folder).weights()[0], folder)
     module.eval()
 
 
@@ -218,7 +218,7 @@ class _Learner:
         for name, array in arrays.items():
             part, _, rest = name.partition("/")
             parts[part][rest] = array
-        _load(self.module, parts["module"], path)
+        load_arrays(self.module, parts["module"], path)
         self.step = step
         average = [torch.tensor(parts["average"][str(i)]) for i in range(len(self._parameters))]
         self._average.load_state_dict({"optimization_step": step, "shadow_params": average})
@@ -323,7 +323,12 @@ def _arrays(module: nn.Module) -> Arrays:
     return {name: tensor.cpu().numpy() for name, tensor in module.state_dict().items()}
 
 
-def _load(module: nn.Module, arrays: Arrays, path: Path) -> None:
+def load_arrays(module: nn.Module, arrays: Arrays, path: Path) -> None:
+    """Put weights that were read from a path into a network.
+
+    Raises:
+        InputError: they are those of another.
+    """
     weights = {name: torch.tensor(array) for name, array in arrays.items()}
     try:
         module.load_state_dict(weights)

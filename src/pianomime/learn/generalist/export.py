@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from pianomime.files import atomic
+from pianomime.generalist.horizon import CHUNK, HIGH_GOALS
 from pianomime.generalist.policy import FORMAT, VERSION, StagePolicy
 from pianomime.generalist.sampler import Sampler
 from pianomime.learn.generalist.bet import BetNet
 from pianomime.learn.generalist.diffusion import DiffusionNet
 from pianomime.learn.generalist.stage import Stage
+from pianomime.world.figures import KEYS
 
 
 def export_stage(stage: Stage, name: str, path: Path) -> None:
@@ -123,9 +125,9 @@ class _Asked(nn.Module):
 
 def _example(stage: Stage) -> tuple[tuple[Tensor, ...], list[str]]:
     """Arguments, and what they are called."""
-    level, width = stage.config.level, len(stage.target.middle)
-    frames = 10 if level == "high" else 4
-    given = {"goal": torch.zeros(2, frames, 88)}
+    width = len(stage.target.middle)
+    frames = HIGH_GOALS if stage.config.level == "high" else CHUNK
+    given = {"goal": torch.zeros(2, frames, KEYS)}
     if len(stage.frames.middle):
         given["frames"] = torch.zeros(2, frames, len(stage.frames.middle))
     given["vector"] = torch.zeros(2, len(stage.vector.middle))

@@ -12,6 +12,7 @@ from pianomime.learn.generalist.diffusion import DiffusionNet
 from pianomime.learn.generalist.mlp import MlpNet
 from pianomime.learn.generalist.scale import SaidScale, Scale
 from pianomime.learn.generalist.sizes import Sizes
+from pianomime.learn.goal.autoencoder import CODE
 
 
 class Stage(nn.Module):
@@ -32,7 +33,7 @@ class Stage(nn.Module):
         self.frames, self.vector = Scale(shapes["frames"][-1]), Scale(shapes["vector"][-1])
         self.target = SaidScale(shapes["target"][-1])
         frames, keys = shapes["goal"]
-        code = keys if encoder is None else 16
+        code = keys if encoder is None else CODE
         chunk, width = shapes["target"]
         sizes = Sizes(frames, code + shapes["frames"][-1], shapes["vector"][-1], chunk, width)
         self.net: DiffusionNet | BetNet | MlpNet

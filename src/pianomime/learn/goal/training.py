@@ -13,7 +13,7 @@ from scipy.stats import spearmanr
 from torch import Tensor, nn
 
 from pianomime.errors import InputError
-from pianomime.learn.fit import Batch, fit
+from pianomime.learn.fit import Batch, fit, load_arrays
 from pianomime.learn.goal.autoencoder import GoalAutoencoder, GoalEncoder
 from pianomime.learn.goal.config import GoalConfig, check_goal
 from pianomime.learn.goal.goals import GoalDraw, Goals, GoalSplit, read_goals
@@ -97,14 +97,10 @@ def load_autoencoder(folder: Path) -> GoalAutoencoder:
     """
     path = folder / _RESULT
     arrays, about = read_tensors(path)
-    if about.get("version") != _VERSION:
-        raise InputError(f"{path}: of another version of this program")
-    try:
-        module = GoalAutoencoder(int(about["octaves"]))
-        weights = {name: torch.from_numpy(array) for name, array in arrays.items()}
-        module.load_state_dict(weights)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise InputError(f"{path}: damaged, or not a goal autoencoder") from error
+    if about.get("version") != _VERSION or "octaves" not in about:
+        raise InputError(f"{path}: not a goal autoencoder, or one of another version")
+    module = GoalAutoencoder(about["octaves"])
+    load_arrays(module, arrays, path)
     return module.eval()
 
 
