@@ -58,6 +58,7 @@ COMMANDS = {
         "pianomime.commands.train_experts", "TrainExperts", "train experts of many songs"
     ),
     "collect": Command("pianomime.commands.collect", "Collect", "make a data set of experts"),
+    "teach": Command("pianomime.commands.teach", "Teach", "make a data set by asking a teacher"),
     "train-goal": Command(
         "pianomime.commands.train_goal", "TrainGoal", "train what tells players their goals"
     ),

@@ -22,8 +22,8 @@ class Train:
 
     Examples:
       pianomime train high-diff --demonstrations demonstrations.npz
-      pianomime train low-diff --experts experts.zarr
-      pianomime train low-diff-res --experts experts.zarr --fit.steps 50000
+      pianomime train low-diff --experts lessons.zarr
+      pianomime train low-diff-res --experts lessons.zarr more.zarr --fit.steps 50000
       pianomime train high-diff --size paper --demonstrations demos -o out/paper
     """
 
@@ -31,8 +31,8 @@ class Train:
     """Which network."""
     demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
     """What high levels learn from: a folder of demonstrations, or published clips (.npz)."""
-    experts: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
-    """What all others learn from: a data set that `pianomime collect` made."""
+    experts: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DATA...")] = ()
+    """What all others learn from: data sets that `pianomime teach` or `pianomime collect` made."""
     goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """The goal encoder; OUT/goal if not given."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")

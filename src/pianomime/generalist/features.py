@@ -29,8 +29,25 @@ def high_inputs(goal: NDArray[np.bool_], tips: NDArray[np.floating]) -> Arrays:
     return {
         "goal": goal.astype(np.float32),
         "frames": np.zeros((len(goal), goal.shape[1], 0), np.float32),
-        "vector": tips.reshape(len(tips), TIPS).astype(np.float32),
+        "vector": from_wrists(tips).reshape(len(tips), TIPS).astype(np.float32),
     }
+
+
+def from_wrists(points: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Points (..., 2, 6, 3) with the fingertips told from where their forearm is.
+
+    So hands do not come apart where a policy goes on from what it said before.
+    """
+    told = points.copy()
+    told[..., 1:, :] -= points[..., :1, :]
+    return told
+
+
+def to_world(told: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Points (..., 2, 6, 3) in the world, of what `from_wrists` told."""
+    points = told.copy()
+    points[..., 1:, :] += told[..., :1, :]
+    return points
 
 
 def low_inputs(
@@ -86,8 +103,8 @@ def octave() -> float:
 def base(level: str, prior: bool, vector: NDArray[np.float32]) -> NDArray[np.float32]:
     """What chunks are told relative to, (B, 1, D).
 
-    Fingertips to where they are; controls to those that hold the present pose; what is added to
-    a prior to nothing. So a network need not tell millimetres in numbers that span the keyboard.
+    Controls to those that hold the present pose, so that a network need not tell millimetres in
+    numbers that span the keyboard; fingertips, and what is added to a prior, to nothing.
 
     Args:
         level: "high", "low" or "whole".
@@ -95,7 +112,7 @@ def base(level: str, prior: bool, vector: NDArray[np.float32]) -> NDArray[np.flo
         vector: (B, V) what is seen.
     """
     if level == "high":
-        return vector[:, None, :TIPS]
+        return np.zeros((len(vector), 1, TIPS), np.float32)
     if prior:
         return np.zeros((len(vector), 1, CONTROLS), np.float32)
     return (vector[:, :JOINTS] @ _holding().T)[:, None]

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from pianomime.errors import InputError
 
 if TYPE_CHECKING:
+    from pianomime.generalist.follower import Follower
     from pianomime.generalist.player import Generalist
+    from pianomime.generalist.sampler import Sampler
 
 METHODS: dict[str, tuple[str, ...]] = {
     "two-stage-diff": ("high-diff", "low-diff"),
@@ -46,10 +48,25 @@ def make_generalist(method: str, effort: int, seed: int = 0) -> Generalist:
     from pianomime.generalist.policy import load_policy
     from pianomime.generalist.sampler import Sampler
 
+    *high, low = METHODS[method]
     sampler = Sampler(*_SAMPLERS[effort])
-    stages = [load_policy(stage_path(stage), sampler) for stage in METHODS[method]]
-    *high, low = stages
-    return Generalist(low, high[0] if high else None, bool(low.about["prior"]), seed=seed)
+    follower = load_follower(stage_path(low), sampler, seed)
+    return Generalist(follower, load_policy(stage_path(high[0]), sampler) if high else None, seed)
+
+
+def load_follower(path: Path, sampler: Sampler | None = None, seed: int = 0) -> Follower:
+    """The tracker of a file of a low level, or of a policy of one stage.
+
+    Raises:
+        InputError: it is damaged, or a high level.
+    """
+    from pianomime.generalist.follower import Follower
+    from pianomime.generalist.policy import load_policy
+
+    policy = load_policy(path, sampler)
+    if policy.about["level"] == "high":
+        raise InputError(f"{path}: says fingertips, not controls")
+    return Follower(policy, seed, policy.about["level"] == "low", policy.about["prior"])
 
 
 def weights_folder() -> Path:

@@ -9,36 +9,28 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.generalist.features import CONTROLS, Arrays, high_inputs, low_inputs, rest_tips
+from pianomime.generalist.features import high_inputs, rest_tips, to_world
+from pianomime.generalist.follower import Follower
 from pianomime.generalist.horizon import CHUNK, HIGH_GOALS
 from pianomime.generalist.policy import Policy
 from pianomime.generalist.snap import snap
 from pianomime.music import Score
 from pianomime.plan import NO_KEY, FingertipPlan
-from pianomime.track import IkTracker
 from pianomime.world import World
 from pianomime.world.figures import KEYS
-from pianomime.world.hand import SIDES, Hand
 
 
 class Generalist:
     """Plays any score with one policy, or with two, the first of which says where fingertips go.
 
     Args:
-        low: says controls.
+        follower: says controls.
         high: says fingertips; None for a policy of one stage.
-        prior: whether controls are told as what to add to those of inverse kinematics.
-        hold: frames of a chunk of controls that are played before the next is asked for.
         seed: of what is drawn; the same seed plays the same.
     """
 
-    def __init__(
-        self, low: Policy, high: Policy | None, prior: bool = False, hold: int = 1, seed: int = 0
-    ) -> None:
-        self._low, self._high = low, high
-        self._ik = IkTracker() if prior else None
-        self._hold, self._seed = hold, seed
-        self._hands = [Hand(side) for side in SIDES]
+    def __init__(self, follower: Follower, high: Policy | None, seed: int = 0) -> None:
+        self._follower, self._high, self._seed = follower, high, seed
 
     def plan(self, score: Score) -> FingertipPlan:
         """A plan at rest, for now; what is played is written into it."""
@@ -55,35 +47,25 @@ class Generalist:
         self._draw = np.random.default_rng(self._seed)
         self._wanted = rest_tips().copy()
         self._pressing = np.full((2, 5), NO_KEY, np.int8)
-        self._chunk = np.empty((0, CONTROLS))
-        if self._ik is not None:
-            self._ik.begin(plan)
+        self._follower.begin(plan)
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) right then left; frames are asked for one after the other."""
-        tips = np.array([hand.points(world.qpos[hand.joints]) for hand in self._hands])
-        targets = self._look_ahead(frame, tips)
-        prior = None if self._ik is None else self._ik.control(frame, world)
-        if not len(self._chunk):
-            seen = self._seen(frame, world, tips, targets, prior)
-            self._chunk = self._low.say(seen, self._draw)[0, : self._hold].astype(np.float64)
-        ctrl, self._chunk = self._chunk[0], self._chunk[1:]
-        if prior is not None:
-            ctrl = ctrl + prior
-        played: NDArray[np.float64] = ctrl
-        return played
+        targets = self._look_ahead(frame, self._follower.points(world))
+        return self._follower.say(frame, world, self._goal[frame : frame + CHUNK], targets)
 
-    def _look_ahead(self, frame: int, tips: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def _look_ahead(self, frame: int, tips: NDArray[np.float64]) -> NDArray[np.float64]:
         """The points (4, 2, 6, 3) of this frame and the next, and into the plan with the first."""
         plan = self._plan
         if self._high is None:
             # Nothing was planned: what is nearest is taken for what presses.
             _, self._pressing = snap(tips, self._goal[frame], self._pressing)
             plan.fingertips[frame] = tips
-            targets = None
+            targets = np.repeat(tips[None], CHUNK, axis=0)
         else:
             seen = high_inputs(self._goal[None, frame : frame + HIGH_GOALS], self._wanted[None])
-            said = self._high.say(seen, self._draw)[0].reshape(-1, 2, 6, 3).astype(np.float64)
+            told = self._high.say(seen, self._draw)[0].reshape(-1, 2, 6, 3)
+            said = to_world(told.astype(np.float64))
             targets, pressing = np.empty((CHUNK, 2, 6, 3)), self._pressing
             for ahead in range(CHUNK):
                 targets[ahead], pressing = snap(said[ahead], self._goal[frame + ahead], pressing)
@@ -93,24 +75,6 @@ class Generalist:
         plan.finger_key[frame] = self._pressing
         self._name_fingers(frame)
         return targets
-
-    def _seen(
-        self,
-        frame: int,
-        world: World,
-        tips: NDArray[np.float64],
-        targets: NDArray[np.float64] | None,
-        prior: NDArray[np.float64] | None,
-    ) -> Arrays:
-        return low_inputs(
-            self._goal[None, frame : frame + CHUNK],
-            None if targets is None else targets[None],
-            tips[None],
-            world.qpos_hands[None],
-            world.qvel_hands[None],
-            world.key_state[None],
-            None if prior is None else prior[None],
-        )
 
     def _name_fingers(self, frame: int) -> None:
         """Write who plays them into the plan, for notes that somebody begins to play."""

@@ -91,7 +91,7 @@ def play_episode(run: RunFolder) -> Episode:
     world = World(quiet=True)
     tracker.begin(plan)
     prior.begin(plan)
-    columns = _empty(len(plan))
+    columns = empty_columns(len(plan))
     pedal_tracker = tracker if isinstance(tracker, PedalTracker) else None
     for frame in range(len(plan)):
         columns["joints"][frame] = world.qpos_hands
@@ -104,7 +104,7 @@ def play_episode(run: RunFolder) -> Episode:
             pedal[frame] = pedal_tracker.pedal(frame)
         world.step(ctrl, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
-    _fill(columns, goal, plan.fingertips, plan.finger_key)
+    fill_columns(columns, goal, plan.fingertips, plan.finger_key)
     f1 = frame_metrics(goal, columns["pressed"]).f1
     return Episode(run.song.score.title, f1, run.config.env.prior, columns)
 
@@ -145,7 +145,7 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
             raise InputError(f"{demonstrations}: clip {clip} is not as long as in {experts}")
         rows = slice(end - length, end)
         theirs = slice(human_ends[place[clip]] - length, human_ends[place[clip]])
-        columns = _empty(int(length))
+        columns = empty_columns(int(length))
         columns["joints"][:] = world_order(recorded["qpos_1e4"][rows] / 1e4)
         columns["velocities"][:] = world_order(recorded["qvel_500"][rows] / 500.0)
         keys = recorded["key_state_255"][rows] / 255.0
@@ -158,7 +158,7 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         finger_key = human["finger_key"][theirs].astype(np.int8)
         columns["prior"][:] = _ik_prior(tips, columns["joints"], keys)
         goal = np.unpackbits(human["goal_packed"][theirs], axis=1)[:, :KEYS].astype(bool)
-        _fill(columns, goal, tips, finger_key)
+        fill_columns(columns, goal, tips, finger_key)
         f1 = frame_metrics(goal, columns["pressed"]).f1
         name = f"clip{clip:03d}"
         of_song, part = int(song[place[clip]]), str(split[place[clip]])
@@ -185,18 +185,20 @@ def _ik_prior(
     return prior
 
 
-def _empty(frames: int) -> dict[str, NDArray[Any]]:
+def empty_columns(frames: int) -> dict[str, NDArray[Any]]:
+    """All columns of an episode of so many frames, to be written into."""
     return {
         name: np.empty((frames, *column.shape), column.dtype) for name, column in COLUMNS.items()
     }
 
 
-def _fill(
+def fill_columns(
     columns: dict[str, NDArray[Any]],
     goal: NDArray[np.bool_],
     tips: NDArray[np.float64],
     finger_key: NDArray[np.int8],
 ) -> None:
+    """Write what the plan tells, and the residual, into columns that have all else."""
     columns["goal"][:] = goal
     columns["fingertips"][:] = tips
     columns["finger_key"][:] = finger_key

@@ -13,7 +13,7 @@ from pianomime.generalist.sampler import Sampler
 from pianomime.learn.generalist.config import STAGES, DiffusionConfig, stage_config
 from pianomime.learn.generalist.export import export_stage, torch_policy
 from pianomime.learn.generalist.stage import SaidScale, Stage
-from pianomime.learn.generalist.unet import TemporalEncoder
+from pianomime.learn.generalist.unet import FrameConvolution, TemporalEncoder
 from pianomime.learn.generalist.windows import Windows
 
 SEEN = ("goal", "frames", "vector")
@@ -119,6 +119,25 @@ def test_what_is_beyond_the_frames_ahead_does_not_matter_to_the_encoder_of_anoth
     frames = torch.randn(6, 4, 5)
     together = encoder(frames)
     torch.testing.assert_close(together[2:3], encoder(frames[2:3]))
+
+
+@pytest.mark.parametrize("frames", [1, 2, 4, 10])
+@pytest.mark.parametrize(("kernel", "stride"), [(1, 1), (3, 1), (5, 1), (3, 2)])
+def test_as_a_product_of_matrices_a_convolution_says_the_same(frames, kernel, stride):
+    ours = FrameConvolution(3, 6, kernel, frames, stride)
+    theirs = torch.nn.Conv1d(3, 6, kernel, stride, kernel // 2)
+    theirs.weight, theirs.bias = ours.weight, ours.bias
+    x = torch.randn(5, 3, frames)
+    torch.testing.assert_close(ours(x), theirs(x))
+
+
+@pytest.mark.parametrize("frames", [1, 2, 5])
+def test_so_does_one_that_doubles_the_frames(frames):
+    ours = FrameConvolution(3, 6, 4, frames, stride=2, transposed=True)
+    theirs = torch.nn.ConvTranspose1d(3, 6, 4, 2, 1)
+    theirs.weight, theirs.bias = ours.weight, ours.bias
+    x = torch.randn(5, 3, frames)
+    torch.testing.assert_close(ours(x), theirs(x))
 
 
 def test_scales_are_taken_back():

@@ -52,7 +52,7 @@ def data(two_notes: Demonstration, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def train(name, data, out, **changes):
     config = replace(stage_config(name), diffusion=TINY, fit=SHORT, **changes)
-    return train_stage(name, config, out, data / "demos", data / "experts.zarr", data / "goal")
+    return train_stage(name, config, out, data / "demos", [data / "experts.zarr"], data / "goal")
 
 
 @pytest.mark.parametrize("low", ["low-diff", "low-diff-res"])
@@ -80,13 +80,13 @@ def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
 def test_what_is_missing_is_named(data, tmp_path):
     config = replace(stage_config("high-diff"), fit=SHORT)
     with pytest.raises(InputError, match="--demonstrations"):
-        train_stage("high-diff", config, tmp_path, None, None, None)
+        train_stage("high-diff", config, tmp_path, None, [], None)
     with pytest.raises(InputError, match="--experts"):
-        train_stage("low-diff", stage_config("low-diff"), tmp_path, None, None, None)
+        train_stage("low-diff", stage_config("low-diff"), tmp_path, None, [], None)
     with pytest.raises(InputError, match="does not exist"):
-        train_stage("high-diff", config, tmp_path, data / "demos", None, tmp_path / "none")
+        train_stage("high-diff", config, tmp_path, data / "demos", [], tmp_path / "none")
     with pytest.raises(InputError, match="nothing to train on"):
-        train_stage("high-diff", config, tmp_path, tmp_path, None, None)
+        train_stage("high-diff", config, tmp_path, tmp_path, [], None)
 
 
 def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):
@@ -94,4 +94,4 @@ def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):
     columns["joints"][2] = np.nan
     write_expert_data(tmp_path / "odd.zarr", iter([Episode("odd", 0.0, "ik", columns)]))
     with pytest.raises(InputError, match="joints of odd"):
-        train_stage("bc-mse", stage_config("bc-mse"), tmp_path, None, tmp_path / "odd.zarr", None)
+        train_stage("bc-mse", stage_config("bc-mse"), tmp_path, None, [tmp_path / "odd.zarr"], None)

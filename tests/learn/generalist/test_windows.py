@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pianomime.generalist.features import base, octave, rest_tips
+from pianomime.generalist.features import base, octave, rest_tips, to_world
 from pianomime.learn.generalist.config import STAGES, stage_config
 from pianomime.learn.generalist.windows import Windows
 
@@ -26,7 +26,7 @@ def test_no_sample_crosses_a_clip(clips):
     np.testing.assert_array_equal(goal[0, :2], clips.columns["goal"][28:30])
     assert not goal[0, 2:].any()
     assert not goal[1:, 1:].any()
-    tips = said(made, sample).reshape(3, 4, 2, 6, 3)
+    tips = to_world(said(made, sample).reshape(3, 4, 2, 6, 3))
     for row, last in enumerate((29, 36, 56)):
         np.testing.assert_allclose(tips[row, -1], clips.columns["fingertips"][last], atol=1e-6)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,8 +75,21 @@ class Clips:
         return self.some(~held), self.some(held)
 
 
-def human_clips(source: Path) -> Clips:
-    """How humans play.
+@dataclass(frozen=True, eq=False)
+class HumanClip:
+    """A demonstration to learn from.
+
+    Attributes:
+        demonstration: it.
+        song: number that clips of one song share.
+    """
+
+    demonstration: Demonstration
+    song: int
+
+
+def read_human(source: Path) -> list[HumanClip]:
+    """Demonstrations to learn from.
 
     Args:
         source: a folder of demonstrations, as `retarget` and `import-demos` write them, or an .npz
@@ -85,11 +98,11 @@ def human_clips(source: Path) -> Clips:
 
     Raises:
         OSError: there is no such file.
-        InputError: it holds no demonstrations, or values that are not finite.
+        InputError: it holds no demonstrations.
     """
     if source.is_dir():
         files = sorted(source.rglob("*.npz"))
-        found = [(Demonstration.load(file), number) for number, file in enumerate(files)]
+        found = [HumanClip(Demonstration.load(file), song) for song, file in enumerate(files)]
     else:
         arrays = read_arrays(source, "an .npz file of arrays")
         count = len(arrays.get("length", [0]))
@@ -99,40 +112,60 @@ def human_clips(source: Path) -> Clips:
         if not len(song) == len(split) == len(odd) == count:
             raise InputError(f"{source}: song_group, split and odd must have a value a clip")
         found = [
-            (demonstration, int(song[number]))
+            HumanClip(demonstration, int(song[number]))
             for number, (demonstration, _) in enumerate(read_published(source))
             if split[number] == "train" and not odd[number]
         ]
+    if not found:
+        raise InputError(f"{source}: holds nothing to train on")
+    return found
+
+
+def human_clips(source: Path) -> Clips:
+    """How humans play, see `read_human`.
+
+    Raises:
+        OSError: there is no such file.
+        InputError: it holds no demonstrations, or values that are not finite.
+    """
     return _together(
         source,
         (
             (
-                one.score.title,
-                song,
-                {"goal": one.score.roll(), "fingertips": one.plan.fingertips.astype(np.float32)},
+                clip.demonstration.score.title,
+                clip.song,
+                {
+                    "goal": clip.demonstration.score.roll(),
+                    "fingertips": clip.demonstration.plan.fingertips.astype(np.float32),
+                },
             )
-            for one, song in found
+            for clip in read_human(source)
         ),
     )
 
 
-def expert_clips(source: Path) -> Clips:
-    """How experts play: the episodes of a data set that are for training.
+def expert_clips(sources: Sequence[Path]) -> Clips:
+    """How experts play, or teachers would: the episodes of data sets that are for training.
+
+    Episodes of different data sets are of one song where these tell the same number.
 
     Raises:
-        InputError: there is no such data set, or values in it are not finite.
+        InputError: a data set is not there, or values in it are not finite.
     """
-    data = ExpertData.open(source)
-    clips = []
-    for number, about in enumerate(data.episodes):
-        if about["split"] == "train":
-            columns = data.episode(number).columns
-            song = about["song"] if about["song"] >= 0 else -number - 1
-            clips.append((about["name"], song, {name: columns[name] for name in EXPERT}))
-    return _together(source, clips)
+
+    def clips() -> Iterator[tuple[str, int, dict[str, NDArray[Any]]]]:
+        for source in sources:
+            data = ExpertData.open(source)
+            for number, about in enumerate(data.episodes):
+                if about["split"] == "train":
+                    columns = data.episode(number).columns
+                    song = about["song"] if about["song"] >= 0 else -number - 1
+                    yield about["name"], song, {name: columns[name] for name in EXPERT}
+
+    return _together(", ".join(map(str, sources)), clips())
 
 
-def _together(source: Path, clips: Iterable[tuple[str, int, dict[str, NDArray[Any]]]]) -> Clips:
+def _together(source: object, clips: Iterable[tuple[str, int, dict[str, NDArray[Any]]]]) -> Clips:
     names, songs, columns = [], [], []
     for name, song, arrays in clips:
         for column, array in arrays.items():

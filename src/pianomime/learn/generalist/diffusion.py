@@ -36,7 +36,7 @@ class DiffusionNet(nn.Module):
         self.encoder = TemporalEncoder(sizes.frames, sizes.channels, config)
         seen = self.encoder.width + sizes.vector
         self.together = nn.Linear(seen, config.condition) if config.condition else nn.Identity()
-        self.unet = ConditionalUnet(sizes.width, config.condition or seen, config)
+        self.unet = ConditionalUnet(sizes.chunk, sizes.width, config.condition or seen, config)
         self.config, self.schedule = config, noise_schedule(config)
 
     def forward(self, ahead: Tensor, vector: Tensor, noisy: Tensor, step: Tensor) -> Tensor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.generalist.features import TIPS, base
+from pianomime.generalist.features import base, to_world
 from pianomime.generalist.sampler import Sampler
 from pianomime.learn.fit import fit
 from pianomime.learn.generalist.clips import Clips, expert_clips, human_clips
@@ -32,7 +32,7 @@ def train_stage(
     config: StageConfig,
     out: Path,
     demonstrations: Path | None,
-    experts: Path | None,
+    experts: Sequence[Path],
     goal: Path | None,
     tell: Tell | None = None,
 ) -> Path:
@@ -84,13 +84,13 @@ def train_stage(
     return result
 
 
-def _data(config: StageConfig, demonstrations: Path | None, experts: Path | None) -> Clips:
+def _data(config: StageConfig, demonstrations: Path | None, experts: Sequence[Path]) -> Clips:
     if config.level == "high":
         if demonstrations is None:
             raise InputError("a high level learns from --demonstrations")
         return human_clips(demonstrations)
-    if experts is None:
-        raise InputError("it learns from --experts, a data set that `pianomime collect` makes")
+    if not experts:
+        raise InputError("it learns from --experts, data sets that `pianomime teach` makes")
     return expert_clips(experts)
 
 
@@ -98,20 +98,28 @@ def _measure(held: Windows) -> Callable[[torch.nn.Module], dict[str, float]]:
     """How far off the first frame of chunks is, in songs that were kept from training."""
     sample, config = held.some(_MEASURED), held.config
     given = {key: sample[key] for key in ("goal", "frames", "vector")}
-    true = sample["target"] + base(config.level, config.prior, sample["vector"])
+    relative_to = base(config.level, config.prior, sample["vector"])
+    true = (sample["target"] + relative_to)[:, 0]
+    still = sample["vector"] if config.level == "high" else relative_to[:, 0]
 
     def measure(module: torch.nn.Module) -> dict[str, float]:
         assert isinstance(module, Stage)
         policy = torch_policy(module, sampler=Sampler())
-        off = np.abs(policy.say(given, np.random.default_rng(0)) - true)[:, 0]
-        usual = np.abs(sample["target"])[:, 0]
+        said = policy.say(given, np.random.default_rng(0))[:, 0]
         if config.level == "high":
-            return {"unseen/off_mm": _tips(off), "unseen/off_mm_if_still": _tips(usual)}
-        return {"unseen/off": float(off.mean()), "unseen/off_if_still": float(usual.mean())}
+            return {
+                "unseen/off_mm": _apart(said, true),
+                "unseen/off_mm_if_still": _apart(still, true),
+            }
+        return {
+            "unseen/off": float(np.abs(said - true).mean()),
+            "unseen/off_if_still": float(np.abs(still - true).mean()),
+        }
 
     return measure
 
 
-def _tips(off: NDArray[np.float32]) -> float:
-    """Mean distance along x and y [mm] of points (B, 36)."""
-    return float(off.reshape(len(off), TIPS // 3, 3)[..., :2].mean() * 1e3)
+def _apart(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    """Mean distance [mm], along x and along y, of points (B, 36) told from their wrists."""
+    off = [to_world(told.reshape(-1, 2, 6, 3)) for told in (one, other)]
+    return float(np.abs(off[0] - off[1])[..., :2].mean() * 1e3)

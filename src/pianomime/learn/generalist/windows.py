@@ -13,6 +13,7 @@ from pianomime.generalist.features import (
     TIPS,
     Arrays,
     base,
+    from_wrists,
     high_inputs,
     low_inputs,
     octave,
@@ -66,7 +67,7 @@ class Windows:
         sample = self._absolute(rows, shift)
         if self.config.level == "high":
             noise = draw.normal(0.0, self.config.tip_noise, (batch, 2, 6, 3))
-            noise[..., 1] += draw.normal(0.0, self.config.hand_noise, (batch, 2, 1))
+            noise[:, :, 0, 1] += draw.normal(0.0, self.config.hand_noise, (batch, 2))
             sample["vector"] += noise.reshape(batch, TIPS).astype(np.float32)
         return self._relative(sample)
 
@@ -108,7 +109,8 @@ class Windows:
         targets = targets + _along(off)[:, None]
         tips = self.tips[rows] + _along(off)
         if config.level == "high":
-            return {**high_inputs(goal, tips), "target": targets.reshape(len(rows), CHUNK, TIPS)}
+            told = from_wrists(targets).reshape(len(rows), CHUNK, TIPS)
+            return {**high_inputs(goal, tips), "target": told}
         joints, prior, action = columns["joints"][rows], None, columns["action"][chunk]
         joints = _slid(joints, off, _SLIDES)
         action = _slid(action, off, _SLIDE_CONTROLS)

@@ -1,0 +1,70 @@
+"""`pianomime teach`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from pianomime.learn.lesson_config import LessonConfig
+
+if TYPE_CHECKING:
+    from pianomime.commands.progress import Tell
+    from pianomime.learn.episode import Episode
+
+
+@dataclass(frozen=True)
+class Teach:
+    """Make a data set for imitation by asking a teacher: the dynamic tracker, on humans' fingertips.
+
+    Demonstrations are played with noise on the controls, by the teacher or by a low level that was
+    trained before (--pilot), and the teacher's controls in every moment are written down: so who
+    learns from them also learns to come back. OUT is a data set as `pianomime collect` makes it.
+
+    Examples:
+      pianomime teach demonstrations.npz -o lessons.zarr
+      pianomime train low-diff --experts lessons.zarr -o first
+      pianomime teach demonstrations.npz --pilot first/low-diff.onnx -o more.zarr
+      pianomime train low-diff --experts lessons.zarr more.zarr
+    """
+
+    demonstrations: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DEMOS")]
+    """A folder of demonstrations, or an .npz file of PianoMime's published ones."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/lessons.zarr")
+    """The data set; one that is there is replaced."""
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Demonstrations played at the same time; one a core if not given."""
+    config: Annotated[LessonConfig, tyro.conf.arg(name="")] = field(default_factory=LessonConfig)
+    """Everything else."""
+
+    def run(self) -> None:
+        """Teach, and print how well demonstrations were played meanwhile.
+
+        Raises:
+            InputError: demonstrations or the pilot cannot be used.
+            OSError: a file cannot be read or written.
+        """
+        from pianomime.commands.extras import extra
+        from pianomime.commands.progress import bars
+
+        played: list[float] = []
+        with extra("train"), bars() as tell:
+            from pianomime.learn.expert_data import write_expert_data
+
+            number = write_expert_data(self.out, self._episodes(tell, played))
+        mean = sum(played) / number
+        print(f"demonstrations played: {number}, at a mean F1 of {mean:.3f}")
+        print(f"saved: {self.out}")
+
+    def _episodes(self, tell: Tell, played: list[float]) -> Iterator[Episode]:
+        from pianomime.learn.generalist.clips import read_human
+        from pianomime.learn.lesson import hold_lessons
+
+        clips = read_human(self.demonstrations)
+        for done, episode in enumerate(hold_lessons(clips, self.config, self.jobs), 1):
+            played.append(episode.f1)
+            yield episode
+            tell("playing", done, len(clips))

@@ -1,0 +1,110 @@
+"""Lessons: a demonstration is played, not always well, while a teacher says what it would do.
+
+What experts leave behind shows only how all goes well: who imitates it does not learn what to do when
+it does not. A teacher that can be asked at any moment, such as a tracker, is asked in the moments
+that the pupil gets into (Ross et al., "A reduction of imitation learning and structured prediction
+to no-regret online learning", 2011); noise on what is played brings on more of them.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections import deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.generalist.methods import load_follower
+from pianomime.learn.episode import Episode, empty_columns, fill_columns
+from pianomime.learn.generalist.clips import HumanClip
+from pianomime.learn.lesson_config import LessonConfig, check_lessons
+from pianomime.music import frame_metrics
+from pianomime.track import DynamicTracker, IkTracker
+from pianomime.world import World
+
+
+def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
+    """Play a demonstration and write down the teacher's controls as `action`.
+
+    Args:
+        clip: what to play.
+        number: of the clip, from which it is drawn.
+        config: how.
+
+    Raises:
+        InputError: the pilot cannot be read.
+    """
+    plan = clip.demonstration.plan
+    teacher, prior = DynamicTracker(), IkTracker()
+    pilot = teacher if config.pilot is None else load_follower(config.pilot)
+    teacher.begin(plan)
+    prior.begin(plan)
+    if pilot is not teacher:
+        pilot.begin(plan)
+    draw = np.random.default_rng([config.seed, number])
+    spread = config.noise * draw.random() * _reach()
+    added = np.zeros(46)
+    goal = clip.demonstration.score.roll()
+    pedal = clip.demonstration.score.pedal_roll()
+    columns = empty_columns(len(plan))
+    world = World(quiet=True)
+    for frame in range(len(plan)):
+        columns["joints"][frame] = world.qpos_hands
+        columns["velocities"][frame] = world.qvel_hands
+        columns["keys"][frame] = world.key_state
+        columns["prior"][frame] = prior.control(frame, world)
+        columns["action"][frame] = taught = teacher.control(frame, world)
+        played = taught if pilot is teacher else pilot.control(frame, world)
+        fresh = np.sqrt(1.0 - config.smooth**2) * draw.standard_normal(46)
+        added = config.smooth * added + fresh
+        world.step(played + spread * added, bool(pedal[frame]))
+        columns["pressed"][frame] = world.pressed
+    fill_columns(columns, goal, plan.fingertips, plan.finger_key)
+    f1 = frame_metrics(goal, columns["pressed"]).f1
+    return Episode(clip.demonstration.score.title, f1, "ik", columns, clip.song)
+
+
+def hold_lessons(
+    clips: Sequence[HumanClip], config: LessonConfig, jobs: int | None = None
+) -> Iterator[Episode]:
+    """Lessons of many clips, in their order, several at a time.
+
+    Args:
+        clips: what to play.
+        config: how.
+        jobs: processes; one a core if None.
+
+    Raises:
+        InputError: the config or the pilot cannot be used.
+    """
+    check_lessons(config)
+    if config.pilot is not None:
+        load_follower(config.pilot)
+    jobs = jobs or os.cpu_count() or 1
+    if jobs == 1:
+        for number, clip in enumerate(clips):
+            yield hold_lesson(clip, number, config)
+        return
+    # Not forked: MuJoCo and ONNX Runtime have threads.
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        waiting: deque[Future[Episode]] = deque()
+        try:
+            for number, clip in enumerate(clips):
+                waiting.append(pool.submit(hold_lesson, clip, number, config))
+                # Episodes are large: few are kept that nobody has taken.
+                if len(waiting) > 2 * jobs:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _reach() -> NDArray[np.float64]:
+    """(46,) noise of each actuator [rad, m] for 1 rad of a finger's, with alike moves of fingertips."""
+    one = np.ones(23)
+    one[:2], one[20:] = 0.3, 0.03
+    return np.tile(one, 2)

@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pianomime import cli
+from pianomime.errors import InputError
+from pianomime.learn.expert_data import ExpertData
+from pianomime.learn.generalist.clips import HumanClip
+from pianomime.learn.lesson import hold_lesson, hold_lessons
+from pianomime.learn.lesson_config import LessonConfig
+from pianomime.track import DynamicTracker
+from pianomime.world import World
+
+QUIET = LessonConfig(noise=0.0)
+
+
+def test_without_noise_the_teacher_plays(two_notes):
+    episode = hold_lesson(HumanClip(two_notes, 7), 0, QUIET)
+    tracker, world = DynamicTracker(), World()
+    tracker.begin(two_notes.plan)
+    for frame in range(len(two_notes.plan)):
+        np.testing.assert_allclose(episode.columns["joints"][frame], world.qpos_hands, atol=1e-6)
+        ctrl = tracker.control(frame, world)
+        np.testing.assert_allclose(episode.columns["action"][frame], ctrl, atol=1e-6)
+        world.step(ctrl)
+    assert episode.song == 7
+    assert episode.f1 > 0.7
+
+
+def test_with_noise_the_teacher_says_how_to_come_back(two_notes):
+    """What is written down is what it would do, not what was done."""
+    clip = HumanClip(two_notes, 0)
+    one, other = (hold_lesson(clip, 0, replace(QUIET, noise=noise)) for noise in (0.05, 0.3))
+    assert np.abs(one.columns["joints"] - other.columns["joints"]).max() > 0.02
+    tracker, world = DynamicTracker(), World()
+    tracker.begin(two_notes.plan)
+    for frame in (5, 20):
+        world.data.qpos[88:] = other.columns["joints"][frame]
+        np.testing.assert_allclose(
+            other.columns["action"][frame], tracker.control(frame, world), atol=1e-5
+        )
+
+
+def test_lessons_are_the_same_however_many_are_held_at_once(two_notes):
+    clips, config = [HumanClip(two_notes, song) for song in range(3)], LessonConfig()
+    alone = [one.columns["action"] for one in hold_lessons(clips, config, jobs=1)]
+    together = [one.columns["action"] for one in hold_lessons(clips, config, jobs=2)]
+    np.testing.assert_array_equal(alone, together)
+    assert not np.array_equal(alone[0], alone[1])
+
+
+def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
+    two_notes.save(tmp_path / "demo.npz")
+    out = tmp_path / "lessons.zarr"
+    cli.main(["teach", str(tmp_path), "-o", str(out), "--jobs", "1"])
+    assert "played: 1," in capsys.readouterr().out
+    assert len(ExpertData.open(out)) == 1
+
+
+@pytest.mark.parametrize(
+    "config", [LessonConfig(noise=-1.0), LessonConfig(noise=float("nan")), LessonConfig(smooth=1.0)]
+)
+def test_settings_out_of_range_are_refused(two_notes, config):
+    with pytest.raises(InputError):
+        next(hold_lessons([HumanClip(two_notes, 0)], config))
+
+
+def test_a_pilot_that_is_no_low_level_is_refused(two_notes, tmp_path):
+    (tmp_path / "pilot.onnx").write_bytes(b"not a network")
+    config = LessonConfig(pilot=tmp_path / "pilot.onnx")
+    with pytest.raises(InputError, match="damaged"):
+        next(hold_lessons([HumanClip(two_notes, 0)], config))
