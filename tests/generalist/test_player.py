@@ -6,8 +6,8 @@ import pytest
 from pianomime import Player
 from pianomime.errors import InputError
 from pianomime.generalist.features import base
-from pianomime.generalist.methods import METHODS, WEIGHTS
 from pianomime.generalist.follower import Follower
+from pianomime.generalist.methods import METHODS, WEIGHTS
 from pianomime.generalist.player import Generalist
 from pianomime.music import Score
 from pianomime.world.figures import key_centres

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Teach:
-    """Make a data set for imitation by asking a teacher: the dynamic tracker, on humans' fingertips.
+    """Make a data set for imitation by asking a teacher, the dynamic tracker on human fingertips.
 
     Demonstrations are played with noise on the controls, by the teacher or by a low level that was
     trained before (--pilot), and the teacher's controls in every moment are written down: so who

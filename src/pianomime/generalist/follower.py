@@ -16,7 +16,7 @@ from pianomime.world.hand import SIDES, Hand
 
 
 class Follower:
-    """Asks a policy for controls, in every frame anew; of the chunk that it says the first is played.
+    """Asks a policy for a chunk of controls in every frame anew, and plays the first of them.
 
     Args:
         policy: of the low level, or of one stage.

@@ -1,8 +1,8 @@
 """Lessons: a demonstration is played, not always well, while a teacher says what it would do.
 
-What experts leave behind shows only how all goes well: who imitates it does not learn what to do when
-it does not. A teacher that can be asked at any moment, such as a tracker, is asked in the moments
-that the pupil gets into (Ross et al., "A reduction of imitation learning and structured prediction
+What experts leave behind shows only how all goes well: who imitates it does not learn what to do
+when it does not. A teacher that can be asked at any moment, such as a tracker, is asked in the
+moments that the pupil gets into (Ross et al., "A reduction of imitation learning and structured prediction
 to no-regret online learning", 2011); noise on what is played brings on more of them.
 """
 
@@ -104,7 +104,7 @@ def hold_lessons(
 
 
 def _reach() -> NDArray[np.float64]:
-    """(46,) noise of each actuator [rad, m] for 1 rad of a finger's, with alike moves of fingertips."""
+    """(46,) noise [rad, m] of actuators that moves fingertips as 1 rad of a finger's does."""
     one = np.ones(23)
     one[:2], one[20:] = 0.3, 0.03
     return np.tile(one, 2)

@@ -1,7 +1,7 @@
 """A one-dimensional U-Net over the frames of a chunk, conditioned by FiLM (paper, appendix F).
 
-Chunks are so short that a convolution over their frames is done as one product of matrices, from all
-frames to all: the same numbers, several times as fast as a convolution on a processor.
+Chunks are so short that a convolution over their frames is done as one product of matrices, from
+all frames to all: the same numbers, and faster on a processor.
 """
 
 from __future__ import annotations
@@ -106,6 +106,8 @@ class FrameConvolution(nn.Module):
     """
 
     places: Tensor
+    weight: Tensor
+    bias: Tensor
 
     def __init__(
         self,
@@ -118,14 +120,16 @@ class FrameConvolution(nn.Module):
     ) -> None:
         super().__init__()
         padding = (kernel - 1) // 2
+        convolution: nn.Conv1d | nn.ConvTranspose1d
         if transposed:
-            convolution: nn.Module = nn.ConvTranspose1d(before, after, kernel, stride, padding)
+            convolution = nn.ConvTranspose1d(before, after, kernel, stride, padding)
             self.frames = stride * frames
             tap = torch.arange(self.frames) - stride * torch.arange(frames)[:, None] + padding
         else:
             convolution = nn.Conv1d(before, after, kernel, stride, padding)
             self.frames = (frames - 1) // stride + 1
             tap = torch.arange(frames)[:, None] - stride * torch.arange(self.frames) + padding
+        assert convolution.bias is not None
         self.weight, self.bias = convolution.weight, convolution.bias
         self.sum = "iok,kts->itos" if transposed else "oik,kts->itos"
         # (kernel, T, S): 1 where that place of the kernel leads from one frame to the other.
@@ -134,10 +138,9 @@ class FrameConvolution(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """(B, D, S)."""
-        whole = torch.einsum(self.sum, self.weight, self.places.to(self.weight.dtype))
+        whole = torch.einsum(self.sum, self.weight, self.places)
         out = x.flatten(1) @ whole.flatten(2).flatten(0, 1).to(x.dtype)
-        assert isinstance(self.bias, Tensor)
-        return out.unflatten(1, (-1, self.frames)) + self.bias[:, None]
+        return out.reshape(x.shape[0], -1, self.frames) + self.bias[:, None]
 
 
 class _Level(nn.Module):
