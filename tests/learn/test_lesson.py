@@ -11,6 +11,7 @@ from pianomime.learn.expert_data import ExpertData
 from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson import hold_lesson, hold_lessons
 from pianomime.learn.lesson_config import LessonConfig
+from pianomime.plan.hand_path import settled
 from pianomime.track import DynamicTracker
 from pianomime.world import World
 
@@ -20,7 +21,7 @@ QUIET = LessonConfig(noise=0.0)
 def test_without_noise_the_teacher_plays(two_notes):
     episode = hold_lesson(HumanClip(two_notes, 7), 0, QUIET)
     tracker, world = DynamicTracker(), World()
-    tracker.begin(two_notes.plan)
+    tracker.begin(settled(two_notes.plan))
     for frame in range(len(two_notes.plan)):
         np.testing.assert_allclose(episode.columns["joints"][frame], world.qpos_hands, atol=1e-6)
         ctrl = tracker.control(frame, world)
@@ -36,7 +37,7 @@ def test_with_noise_the_teacher_says_how_to_come_back(two_notes):
     one, other = (hold_lesson(clip, 0, replace(QUIET, noise=noise)) for noise in (0.05, 0.3))
     assert np.abs(one.columns["joints"] - other.columns["joints"]).max() > 0.02
     tracker, world = DynamicTracker(), World()
-    tracker.begin(two_notes.plan)
+    tracker.begin(settled(two_notes.plan))
     for frame in (5, 20):
         world.data.qpos[88:] = other.columns["joints"][frame]
         np.testing.assert_allclose(

@@ -2,8 +2,8 @@
 
 What experts leave behind shows only how all goes well: who imitates it does not learn what to do
 when it does not. A teacher that can be asked at any moment, such as a tracker, is asked in the
-moments that the pupil gets into (Ross et al., "A reduction of imitation learning and structured prediction
-to no-regret online learning", 2011); noise on what is played brings on more of them.
+moments that the pupil gets into (Ross et al., "A reduction of imitation learning and structured
+prediction to no-regret online learning", 2011); noise on what is played brings on more of them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from pianomime.learn.episode import Episode, empty_columns, fill_columns
 from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson_config import LessonConfig, check_lessons
 from pianomime.music import frame_metrics
+from pianomime.plan.hand_path import settled
 from pianomime.track import DynamicTracker, IkTracker
 from pianomime.world import World
 
@@ -40,7 +41,8 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
     plan = clip.demonstration.plan
     teacher, prior = DynamicTracker(), IkTracker()
     pilot = teacher if config.pilot is None else load_follower(config.pilot)
-    teacher.begin(plan)
+    # What is shown are the human's fingertips; the teacher knows better what the robot's can do.
+    teacher.begin(settled(plan))
     prior.begin(plan)
     if pilot is not teacher:
         pilot.begin(plan)
