@@ -37,7 +37,7 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    assert set(results) == {"player", "effort", "seconds", "songs", "mean", "causes"}
+    assert set(results) == {"player", "effort", "seed", "seconds", "songs", "mean", "causes"}
     assert results["seconds"] == 1.0
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())

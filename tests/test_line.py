@@ -8,7 +8,7 @@ from hypothesis import given, settings
 
 from any_score import scores
 from pianomime import songs
-from pianomime.generalist.methods import METHODS
+from pianomime.generalist.methods import FINGERS, METHODS
 from pianomime.music import Score
 from pianomime.play import PLAYERS, Player, excerpt
 from pianomime.world import World
@@ -17,7 +17,7 @@ from pianomime.world.figures import key_centres
 
 @pytest.mark.filterwarnings("ignore::pianomime.world.PhysicsWarning")
 # Those that learned have weights, and tests, of their own.
-@pytest.mark.parametrize("player", sorted({*PLAYERS} - {*METHODS}))
+@pytest.mark.parametrize("player", sorted({*PLAYERS} - {FINGERS, *METHODS}))
 @settings(max_examples=12, deadline=None)
 @given(score=scores())
 def test_any_score_is_played(player: str, score: Score) -> None:

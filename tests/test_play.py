@@ -5,7 +5,7 @@ import pytest
 
 from pianomime import Player, excerpt, songs
 from pianomime.errors import InputError
-from pianomime.generalist.methods import METHODS
+from pianomime.generalist.methods import FINGERS, METHODS
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
 from pianomime.play import PLAYERS
@@ -119,7 +119,7 @@ def test_an_unknown_player_is_refused_with_a_list() -> None:
 
 
 # Those that learned have weights, and tests, of their own.
-@pytest.mark.parametrize("name", sorted({*PLAYERS} - {*METHODS}))
+@pytest.mark.parametrize("name", sorted({*PLAYERS} - {FINGERS, *METHODS}))
 def test_every_player_plays_and_does_so_again(name: str) -> None:
     score = excerpt(Score.from_midi(songs.path("beethoven-ode-to-joy")), seconds=3.0)
     first = Player.from_name(name).play(score)

@@ -63,6 +63,12 @@ COMMANDS = {
         "pianomime.commands.train_goal", "TrainGoal", "train what tells players their goals"
     ),
     "train": Command("pianomime.commands.train", "Train", "train a network that plays every song"),
+    "train-fingers": Command(
+        "pianomime.commands.train_fingers", "TrainFingers", "train what fingers add to zero-shot"
+    ),
+    "train-sac": Command(
+        "pianomime.commands.train_sac", "TrainSac", "train by trying, without demonstrations"
+    ),
     "explain": Command("pianomime.commands.explain", "Explain", "say why notes went wrong"),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }

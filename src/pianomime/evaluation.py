@@ -17,6 +17,7 @@ from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.files import atomic
+from pianomime.generalist.methods import weight_files
 from pianomime.play import EFFORT, SECONDS, check_player
 from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
@@ -40,6 +41,7 @@ def evaluate(
     out: str | Path | None = None,
     progress: Progress | None = None,
     effort: int = EFFORT,
+    seed: int = 0,
 ) -> dict[str, Any]:
     """Play and score songs, several at a time, each in a process of its own.
 
@@ -56,13 +58,14 @@ def evaluate(
         out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
         progress: told how far it is.
         effort: how hard the player tries, 0 to 3.
+        seed: of what it draws.
 
     Returns:
-        What `results.json` holds: `player`, `effort` and `seconds` as asked for (None: whole
-        songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was measured,
-        over the songs that did not fail; empty if all did) and `causes` (`missed` and `wrong`:
-        the share of the key-frames wanted in all songs that each cause cost, the costliest
-        first).
+        What `results.json` holds: `player`, `effort`, `seed` and `seconds` as asked for (None:
+        whole songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was
+        measured, over the songs that did not fail; empty if all did) and `causes` (`missed` and
+        `wrong`: the share of the key-frames wanted in all songs that each cause cost, the
+        costliest first).
 
     Raises:
         InputError: a path stands for no song, or there is no such player.
@@ -74,7 +77,8 @@ def evaluate(
         raise InputError(f"seconds must be more than 0, not {seconds:g}")
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
-    store = None if out is None else _Store(Path(out), f"{player} {effort} {seconds:g}")
+    setting = f"{player} {effort} {seconds:g} {seed} {_digest(weight_files(player))}"
+    store = None if out is None else _Store(Path(out), setting)
 
     rows: dict[Path, Row] = {}
 
@@ -93,7 +97,7 @@ def evaluate(
         else:
             rows[song] = known
             tell()
-    with closing(_play_all(waiting, player, effort, seconds, jobs or _cores())) as played:
+    with closing(_play_all(waiting, player, effort, seconds, seed, jobs or _cores())) as played:
         for song, row in played:
             if store is not None and "error" not in row:
                 store.put(song, row)
@@ -103,6 +107,7 @@ def evaluate(
     results = {
         "player": player,
         "effort": effort,
+        "seed": seed,
         "seconds": seconds if math.isfinite(seconds) else None,
         "songs": [rows[song] for song in songs],
         "mean": _mean(list(rows.values())),
@@ -222,9 +227,16 @@ def _program_hash() -> str:
     digest = hashlib.sha256()
     for library in _LIBRARIES:
         digest.update(f"{library} {version(library)} ".encode())
-    for file in sorted(Path(__file__).parent.rglob("*")):
-        if file.suffix in (".py", ".json"):
-            digest.update(file.read_bytes())
+    files = sorted(Path(__file__).parent.rglob("*"))
+    digest.update(_digest(file for file in files if file.suffix in (".py", ".json")).encode())
+    return digest.hexdigest()
+
+
+def _digest(files: Iterable[Path]) -> str:
+    """Changes with the content of files."""
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
     return digest.hexdigest()
 
 
@@ -236,13 +248,13 @@ def _cores() -> int:
 
 
 def _play_all(
-    songs: list[Path], player: str, effort: int, seconds: float, jobs: int
+    songs: list[Path], player: str, effort: int, seconds: float, seed: int, jobs: int
 ) -> Generator[tuple[Path, Row], None, None]:
     """Songs with their rows, in the order in which they finish."""
     if not songs:
         return
     idle: queue.SimpleQueue[SongWorker] = queue.SimpleQueue()
-    workers = [SongWorker(player, effort, seconds) for _ in range(min(jobs, len(songs)))]
+    workers = [SongWorker(player, effort, seconds, seed) for _ in range(min(jobs, len(songs)))]
     for worker in workers:
         idle.put(worker)
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pianomime.errors import InputError
-from pianomime.generalist.methods import METHODS, make_generalist
+from pianomime.generalist.methods import FINGERS, METHODS, make_fingers, make_generalist
 from pianomime.music import Score
 from pianomime.performance import Performance
 from pianomime.plan import Planner, ZeroShotPlanner
@@ -95,20 +95,21 @@ class Player:
     effort: int = 0
 
     @classmethod
-    def from_name(cls, name: str, effort: int = EFFORT) -> Player:
+    def from_name(cls, name: str, effort: int = EFFORT, seed: int = 0) -> Player:
         """A player that the house knows.
 
         Args:
             name: one of `PLAYERS`.
             effort: 0 plays straight away; 1 to 3 try variations of what goes wrong before it
                 is played, ever more of them. Players that do not search are always the same.
+            seed: of what it draws.
 
         Raises:
             InputError: there is no such player, or no such effort; the message lists those
                 there are.
         """
         check_player(name, effort)
-        return PLAYERS[name](effort)
+        return PLAYERS[name](effort, seed)
 
     @classmethod
     def from_demonstration(
@@ -185,37 +186,49 @@ class Player:
         )
 
 
-def _zero_shot(effort: int) -> Player:
-    return Player("zero-shot", ZeroShotPlanner(), _searching(effort), effort)
+def _zero_shot(effort: int, seed: int) -> Player:
+    tracker = _searching(DynamicTracker(), effort, seed)
+    return Player("zero-shot", ZeroShotPlanner(), tracker, effort)
 
 
-def _zero_shot_ik(_: int) -> Player:
+def _zero_shot_ik(_: int, __: int) -> Player:
     return Player("zero-shot-ik", ZeroShotPlanner(), IkTracker())
 
 
-def _generalist(method: str) -> Callable[[int], Player]:
-    def make(effort: int) -> Player:
-        both = make_generalist(method, effort)
+def _fingers(effort: int, seed: int) -> Player:
+    tracker = _searching(make_fingers(), effort, seed)
+    return Player(FINGERS, ZeroShotPlanner(), tracker, effort)
+
+
+def _generalist(method: str) -> Callable[[int, int], Player]:
+    def make(effort: int, seed: int) -> Player:
+        both = make_generalist(method, effort, seed)
         return Player(method, both, both, effort)
 
     return make
 
 
-PLAYERS: dict[str, Callable[[int], Player]] = {
+PLAYERS: dict[str, Callable[[int, int], Player]] = {
     "zero-shot": _zero_shot,
     "zero-shot-ik": _zero_shot_ik,
+    FINGERS: _fingers,
     **{method: _generalist(method) for method in METHODS},
 }
-"""Every player by name, given the effort.
+"""Every player by name, given the effort and the seed of what it draws.
 
 A new one is one more line; what others need not wait for, such as learned weights, it imports and
 loads inside its function.
 """
 
 
-def _searching(effort: int) -> Tracker:
-    tracker: Tracker = DynamicTracker()
-    return RolloutTracker(tracker, RolloutConfig.of_effort(effort)) if effort else tracker
+def _searching(tracker: Tracker, effort: int, seed: int = 0) -> Tracker:
+    if not effort:
+        return tracker
+    return RolloutTracker(tracker, replace(RolloutConfig.of_effort(effort), seed=seed))
+
+
+def _dynamic(effort: int) -> Tracker:
+    return _searching(DynamicTracker(), effort)
 
 
 def _plain_ik(_: int) -> Tracker:
@@ -223,7 +236,7 @@ def _plain_ik(_: int) -> Tracker:
 
 
 DEMONSTRATION_PLAYERS: dict[str, Callable[[int], Tracker]] = {
-    "demonstration": _searching,
+    "demonstration": _dynamic,
     "demonstration-ik": _plain_ik,
 }
 """The tracker of every player of demonstrations, by the player's name, given the effort."""

@@ -32,10 +32,11 @@ class SongWorker:
         player: name of the player.
         effort: how hard it tries, 0 to 3.
         seconds: how much of a song to play at most [s].
+        seed: of what it draws.
     """
 
-    def __init__(self, player: str, effort: int, seconds: float) -> None:
-        self._arguments = [player, str(effort), str(seconds)]
+    def __init__(self, player: str, effort: int, seconds: float, seed: int = 0) -> None:
+        self._arguments = [player, str(effort), str(seconds), str(seed)]
         # One thread may wait for a song in `play` while another calls `close`.
         self._lock = threading.Lock()
         self._closed = False
@@ -114,13 +115,13 @@ def _row(song: Path, player: Player, seconds: float) -> dict[str, Any]:
 
 def main() -> None:
     """Answer until the input ends."""
-    name, effort, seconds = sys.argv[1:]
+    name, effort, seconds, seed = sys.argv[1:]
     # Anything that a library prints must not get between the rows.
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     # What warnings tell, such as that the physics broke, is counted in the row.
     warnings.simplefilter("ignore")
-    player = Player.from_name(name, int(effort))
+    player = Player.from_name(name, int(effort), int(seed))
     for line in sys.stdin:
         row = _row(Path(json.loads(line)), player, float(seconds))
         print(json.dumps(row, allow_nan=False), file=answers, flush=True)

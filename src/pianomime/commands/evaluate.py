@@ -35,6 +35,8 @@ class Evaluate:
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Songs played at the same time; one a core if not given. They slow each other down: compare
     real time only between runs with the same N."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Of what the player draws."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the results; out/evaluate-PLAYER-EFFORT if not given."""
 
@@ -48,7 +50,8 @@ class Evaluate:
         from pianomime.commands.progress import bars
         from pianomime.evaluation import evaluate, markdown
 
-        out = self.out or Path("out", f"evaluate-{self.player}-{self.effort}")
+        seeded = f"-seed{self.seed}" if self.seed else ""
+        out = self.out or Path("out", f"evaluate-{self.player}-{self.effort}{seeded}")
         with bars() as tell:
             results = evaluate(
                 self.paths,
@@ -58,6 +61,7 @@ class Evaluate:
                 out,
                 progress=lambda done, total, f1: tell("songs", done, total, _remark(f1)),
                 effort=self.effort,
+                seed=self.seed,
             )
         print(markdown(results))
         print(f"saved: {out / 'results.json'}")

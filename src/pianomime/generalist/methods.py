@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pianomime.errors import InputError
 
 if TYPE_CHECKING:
+    from pianomime.generalist.fingers import FingerTracker
     from pianomime.generalist.follower import Follower
     from pianomime.generalist.player import Generalist
     from pianomime.generalist.sampler import Sampler
@@ -20,9 +21,16 @@ METHODS: dict[str, tuple[str, ...]] = {
     "two-stage-bet": ("high-bet", "low-bet"),
     "one-stage-diff": ("one-stage-diff",),
     "bc-mse": ("bc-mse",),
+    "multi-task-sac": ("multi-task-sac",),
 }
-"""The stages of each method that imitates: from goals to fingertips and on to controls, or from
-goals to controls at once (appendix G)."""
+"""The stages of each method: from goals to fingertips and on to controls, or from goals to controls
+at once (appendix G)."""
+
+FINGERS = "fingers"
+"""The player with one learned residual for every finger; a stage of the same name."""
+
+_TRAINED_BY = {FINGERS: "train-fingers", "multi-task-sac": "train-sac"}
+"""The command that makes a stage, where it is not `train`."""
 
 WEIGHTS = "PIANOMIME_WEIGHTS"
 """Name of the environment variable that tells a folder of weights other than those that came with
@@ -54,6 +62,28 @@ def make_generalist(method: str, effort: int, seed: int = 0) -> Generalist:
     return Generalist(follower, load_policy(stage_path(high[0]), sampler) if high else None, seed)
 
 
+def make_fingers() -> FingerTracker:
+    """The tracker with the learned residual of fingers.
+
+    Raises:
+        InputError: its weights are not there, or cannot be read.
+    """
+    from pianomime.generalist.fingers import FingerTracker
+    from pianomime.generalist.policy import load_network
+
+    return FingerTracker(load_network(stage_path(FINGERS))[0])
+
+
+def weight_files(player: str) -> list[Path]:
+    """The files that decide how a player plays; none for players that have learned nothing.
+
+    Raises:
+        InputError: one is not there.
+    """
+    stages = (FINGERS,) if player == FINGERS else METHODS.get(player, ())
+    return [stage_path(stage) for stage in stages]
+
+
 def load_follower(path: Path, sampler: Sampler | None = None, seed: int = 0) -> Follower:
     """The tracker of a file of a low level, or of a policy of one stage.
 
@@ -82,8 +112,9 @@ def stage_path(stage: str) -> Path:
     """
     path = weights_folder() / f"{stage}.onnx"
     if not path.is_file():
+        command = _TRAINED_BY.get(stage, f"train {stage}")
         raise InputError(
-            f"{path} is not there: train it with `pianomime train {stage}`, or name a folder of "
+            f"{path} is not there: train it with `pianomime {command}`, or name a folder of "
             f"weights in {WEIGHTS}"
         )
     return path

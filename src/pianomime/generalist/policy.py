@@ -19,6 +19,10 @@ FORMAT = "pianomime stage"
 VERSION = 1
 
 
+Run = Callable[[dict[str, NDArray[Any]]], list[NDArray[np.float32]]]
+"""Gives what a network says of what it is given, by name."""
+
+
 class Policy(Protocol):
     """Says chunks."""
 
@@ -32,13 +36,13 @@ class StagePolicy:
     """A trained stage.
 
     Attributes:
-        run: gives what the network says of what it is given, by name.
+        run: the network.
         about: `stage`, `level`, `prior`, `network`, `chunk`, `width`, and of a diffusion `steps`
             and `prediction`, and the `scale` of what is said.
         sampler: how a diffusion is run.
     """
 
-    run: Callable[[dict[str, NDArray[Any]]], list[NDArray[np.float32]]]
+    run: Run
     about: dict[str, Any]
     sampler: Sampler
 
@@ -73,6 +77,16 @@ def load_policy(path: Path, sampler: Sampler | None = None) -> StagePolicy:
     """A stage that was exported, run by ONNX Runtime.
 
     Raises:
+        InputError: as `load_network`.
+    """
+    run, about = load_network(path)
+    return StagePolicy(run, about, sampler or Sampler())
+
+
+def load_network(path: Path) -> tuple[Run, dict[str, Any]]:
+    """A network that was exported: what runs it, and what it tells of itself.
+
+    Raises:
         InputError: there is no such file, it is damaged or of another version, or ONNX Runtime is
             not installed.
     """
@@ -99,4 +113,4 @@ def load_policy(path: Path, sampler: Sampler | None = None) -> StagePolicy:
         raise InputError(f"{path}: damaged, or not a stage of a player") from error
     if not known:
         raise InputError(f"{path}: a stage of another version than this program's")
-    return StagePolicy(lambda given: session.run(None, given), about, sampler or Sampler())
+    return lambda given: session.run(None, given), about

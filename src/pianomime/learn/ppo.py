@@ -10,20 +10,23 @@ checkpoint would otherwise differ in the last digits from one that went on.
 from __future__ import annotations
 
 import math
-import random
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from pianomime.errors import InputError
 from pianomime.learn.config import PpoConfig
 from pianomime.learn.policy import ACTIVATIONS, PolicyTracker
+from pianomime.learn.ppo_model import (
+    Ppo,
+    actor_network,
+    model_arrays,
+    resume_model,
+    seed_update,
+    torch_threads,
+)
 from pianomime.learn.run_folder import Evaluation, RunFolder
 from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_vec_env import SongVecEnv
@@ -63,44 +66,6 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
     boundary.between_updates()
 
 
-class _Ppo(PPO):
-    """PPO that leaves the cores to whoever needs them.
-
-    Attributes:
-        threads: of the networks in updates.
-    """
-
-    threads: int
-
-    def collect_rollouts(self, *arguments: Any, **named: Any) -> bool:
-        """Play. Threads of networks that wait for the next pass would keep cores from physics."""
-        with _torch_threads(1):
-            return super().collect_rollouts(*arguments, **named)
-
-    def train(self) -> None:
-        """Learn, with the products of matrices in bfloat16 (sums in float32) where that is faster.
-
-        They are most of an update.
-        """
-        precision = torch.get_float32_matmul_precision()
-        torch.set_float32_matmul_precision("medium")
-        try:
-            with _torch_threads(self.threads):
-                super().train()
-        finally:
-            torch.set_float32_matmul_precision(precision)
-
-
-@contextmanager
-def _torch_threads(threads: int) -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
 def make_model(env: SongVecEnv, settings: PpoConfig, seed: int, threads: int = 0) -> PPO:
     """Stable-Baselines3's PPO with these settings, untrained.
 
@@ -116,8 +81,8 @@ def make_model(env: SongVecEnv, settings: PpoConfig, seed: int, threads: int = 0
         update = max(model.num_timesteps // settings.steps_per_update - 1, 0)
         return settings.learning_rate * settings.decay**update
 
-    model: _Ppo
-    model = _Ppo(
+    model: Ppo
+    model = Ppo(
         "MlpPolicy",
         env,
         learning_rate=settings.learning_rate,
@@ -157,22 +122,7 @@ class _Boundary(BaseCallback):
         """Put model and environments where a checkpoint has them."""
         self._curve = [Evaluation(**row) for row in about["curve"]]
         self.model.num_timesteps = int(about["steps"])
-        parts: dict[str, Arrays] = {"policy": {}, "adam": {}, "env": {}}
-        for name, array in arrays.items():
-            part, _, rest = name.partition("/")
-            parts[part][rest] = array
-        try:
-            self.model.policy.load_state_dict(_tensors(parts["policy"]))
-        except RuntimeError as error:
-            raise InputError(f"{self._run.path}: the checkpoint does not fit the config") from error
-        optimizer = self.model.policy.optimizer
-        known = optimizer.state_dict()
-        known["state"] = {}
-        for name, tensor in _tensors(parts["adam"]).items():
-            index, _, field = name.partition("/")
-            known["state"].setdefault(int(index), {})[field] = tensor
-        optimizer.load_state_dict(known)
-        self._env.resume(parts["env"])
+        self._env.resume(resume_model(self.model, arrays, self._run.path))
         self._fresh = False
 
     def between_updates(self) -> None:
@@ -187,10 +137,7 @@ class _Boundary(BaseCallback):
                 self._evaluate(steps)
             self._run.checkpoint(self._arrays(), {"steps": steps}, self._curve)
         self._fresh = True
-        draws = np.random.SeedSequence([self._run.config.seed, update]).generate_state(3)
-        torch.manual_seed(int(draws[0]))
-        np.random.seed(int(draws[1]))  # noqa: NPY002 - Stable-Baselines3 draws from it
-        random.seed(int(draws[2]))
+        seed_update(self._run.config.seed, update)
         self._env.reseed(self._run.config.seed, update)
 
     def _on_rollout_start(self) -> None:
@@ -207,7 +154,7 @@ class _Boundary(BaseCallback):
         weights = _actor_arrays(self.model)
         tracker = PolicyTracker.from_arrays(self._run.song, self._run.config, weights)
         player = Player("expert", DemonstrationPlanner(self._run.song), tracker)
-        with _torch_threads(1):
+        with torch_threads(1):
             metrics = player.play(self._run.song.score).metrics()
         made = Evaluation(steps, metrics["precision"], metrics["recall"], metrics["f1"])
         if made.f1 > max((one.f1 for one in self._curve), default=-1.0):
@@ -221,23 +168,13 @@ class _Boundary(BaseCallback):
         self.logger.dump(steps)
 
     def _arrays(self) -> Arrays:
-        arrays: Arrays = {}
-        for name, tensor in self.model.policy.state_dict().items():
-            arrays[f"policy/{name}"] = tensor.numpy()
-        for index, fields in self.model.policy.optimizer.state_dict()["state"].items():
-            for field, tensor in fields.items():
-                arrays[f"adam/{index}/{field}"] = tensor.numpy()
+        arrays = model_arrays(self.model)
         for name, array in self._env.batch.state().items():
             arrays[f"env/{name}"] = array
         return arrays
 
 
-def _tensors(arrays: Arrays) -> dict[str, torch.Tensor]:
-    return {name: torch.from_numpy(array.copy()) for name, array in arrays.items()}
-
-
 def _actor_arrays(model: Any) -> Arrays:
     """The weights of the actor alone, named as `pianomime.learn.policy.actor` names them."""
-    layers = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
-    network = torch.nn.Sequential(*layers)
-    return {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}
+    weights = actor_network(model).state_dict()
+    return {name: tensor.numpy().copy() for name, tensor in weights.items()}

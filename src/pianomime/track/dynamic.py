@@ -87,6 +87,13 @@ class DynamicTracker:
             ctrl = middle @ hand.to_ctrl.T + to_actuators(hand, torque) / hand.gain
             self._feedforward[:, hand.actuators] = ctrl
 
+    def aim(self, frame: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where fingertips (2, 5, 3) [m] and joints (2, 27) [rad, m] are to be before a frame."""
+        return (
+            np.array([tips[frame] for tips in self._tips]),
+            np.array([path[frame] for path in self._paths]),
+        )
+
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) right then left: feed-forward, and a share of the present errors.
 

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from pianomime.plan import FingertipPlan
 from pianomime.track.tracker import Tracker
 from pianomime.world import World, WorldBatch
-from pianomime.world.figures import key_centres
+from pianomime.world.figures import FINGER_ACTUATORS, key_centres
 from pianomime.world.hand import SIDES, Hand
 
-# Actuators of a hand: wrist and forearm, and each finger's, thumb first.
+# Actuators of a hand: wrist and forearm.
 _ARM = [0, 1, 20, 21, 22]
-_FINGERS = [slice(2, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 20)]
 
 
 @dataclass(frozen=True)
@@ -167,7 +166,7 @@ class RolloutTracker:
                 mine = chance[self._hands[index].actuators]
                 np.maximum(mine, self.config.others, out=mine)
                 mine[_ARM] = np.maximum(mine[_ARM], self.config.arm)
-                mine[_FINGERS[finger]] = self.config.blamed
+                mine[FINGER_ACTUATORS[finger]] = self.config.blamed
         return chance
 
     def _variations(self, frames: int, chance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,6 +28,10 @@ HAND_ACTUATORS = 23
 RIGHT_JOINTS = slice(KEYS, KEYS + HAND_JOINTS)
 LEFT_JOINTS = slice(KEYS + HAND_JOINTS, KEYS + 2 * HAND_JOINTS)
 FINGER_PREFIXES = ("th", "ff", "mf", "rf", "lf")
+FINGER_JOINTS = (slice(22, 27), slice(5, 9), slice(9, 13), slice(13, 17), slice(17, 22))
+"""Joints of each finger among those of its hand, thumb first."""
+FINGER_ACTUATORS = (slice(2, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 20))
+"""Its actuators among those of its hand."""
 
 BLACK = np.array([(key + 9) % 12 in (1, 3, 6, 8, 10) for key in range(KEYS)])
 """(88,) bool: the black keys; key 0 is A0."""

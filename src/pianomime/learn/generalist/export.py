@@ -35,16 +35,40 @@ def export_stage(stage: Stage, name: str, path: Path) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    import onnx
-
     given, names = _example(stage)
     outputs = ["chance", "exact"] if stage.config.network == "bet" else ["said"]
+    export_network(_Asked(stage).eval(), given, names, outputs, about_stage(stage, name), path)
+
+
+def export_network(
+    network: nn.Module,
+    given: tuple[Tensor, ...],
+    names: list[str],
+    outputs: list[str],
+    about: dict[str, Any],
+    path: Path,
+) -> None:
+    """Write a network as ONNX, whole or not at all.
+
+    Args:
+        network: in eval mode.
+        given: examples of what it is given, in batches.
+        names: of these.
+        outputs: names of what it says.
+        about: what the file tells of it.
+        path: where to.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    import onnx
+
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         logging.getLogger("torch.onnx").setLevel(logging.ERROR)
         raw = Path(folder, "stage.onnx")
         torch.onnx.export(
-            _Asked(stage).eval(),
+            network,
             given,
             str(raw),
             input_names=names,
@@ -53,7 +77,9 @@ def export_stage(stage: Stage, name: str, path: Path) -> None:
             dynamo=False,
         )
         model = onnx.load(str(raw))
-    onnx.helper.set_model_props(model, {"about": json.dumps(about_stage(stage, name))})
+    onnx.helper.set_model_props(
+        model, {"about": json.dumps({"format": FORMAT, "version": VERSION, **about})}
+    )
     with atomic(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
 
@@ -77,8 +103,6 @@ def about_stage(stage: Stage, name: str) -> dict[str, Any]:
     """What a file of a stage tells of itself."""
     config = stage.config
     about: dict[str, Any] = {
-        "format": FORMAT,
-        "version": VERSION,
         "stage": name,
         "level": config.level,
         "prior": config.prior,

@@ -1,0 +1,1 @@
+"""Multi-task reinforcement learning: one policy for all songs, without demonstrations (SAC)."""

@@ -1,0 +1,248 @@
+"""Training of the policy that learns all songs by trying, from songs to the file that is played."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import SAC
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
+from torch import Tensor, nn
+
+from pianomime.generalist.features import CONTROLS, TIPS, low_inputs
+from pianomime.generalist.horizon import CHUNK
+from pianomime.learn.fit_folder import FitFolder
+from pianomime.learn.generalist.export import export_network
+from pianomime.learn.generalist.scale import Scale
+from pianomime.learn.reward import press_reward
+from pianomime.learn.run_lock import run_lock
+from pianomime.learn.run_log import RunLog
+from pianomime.learn.sac.config import SacConfig, check_sac
+from pianomime.learn.song import load_score
+from pianomime.learn.songs_vec_env import Played, SongsVecEnv
+from pianomime.learn.tell import Tell
+from pianomime.music import Score
+from pianomime.song_files import find_songs
+from pianomime.world.figures import KEYS
+from pianomime.world.hand import SIDES, Hand
+
+STAGE = "multi-task-sac"
+_STEP, _SLIDE = 0.3, 0.06
+"""[rad], [m] that an action of 1 sends an actuator away from where it is, or a forearm."""
+_SCALED_BY = 64
+"""Frames, in all worlds, from which the scale of what is seen is taken."""
+_VECTOR = 108 + KEYS + TIPS
+_HIT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class AskedSong:
+    """A song, of which nothing is known but what it asks for.
+
+    Attributes:
+        goal: (T, 88) bool.
+        pedal: (T,) bool.
+    """
+
+    goal: NDArray[np.bool_]
+    pedal: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, score: Score) -> AskedSong:
+        """What a score asks for."""
+        return cls(score.roll(), score.pedal_roll())
+
+
+class SacVecEnv(SongsVecEnv):
+    """Both hands of a world are one agent, which sees what a policy of one stage sees.
+
+    Args:
+        songs: what is played.
+        config: how.
+        threads: how many worlds step at the same time; 0 for one on each core.
+    """
+
+    def __init__(self, songs: Sequence[AskedSong], config: SacConfig, threads: int = 0) -> None:
+        silence = np.zeros((CHUNK, KEYS), bool)
+        self._goals = [np.vstack([song.goal, silence]) for song in songs]
+        self._hands = [Hand(side) for side in SIDES]
+        self._holding = np.zeros((config.worlds, CONTROLS))
+        super().__init__(songs, config.worlds, 1, CHUNK * KEYS + _VECTOR, CONTROLS, threads)
+
+    def look(self) -> NDArray[np.float32]:
+        """As `SongsVecEnv.look`."""
+        qpos, joints = self.worlds.qpos, self.worlds.qpos_hands
+        tips = np.array([[hand.points(row[hand.joints]) for hand in self._hands] for row in qpos])
+        goal = np.array([self._goals[song][at : at + CHUNK] for song, at in self.rows.tolist()])
+        keys = self.worlds.key_state
+        seen = low_inputs(goal, None, tips, joints, self.worlds.qvel_hands, keys, None)
+        for hand in self._hands:
+            here = qpos[:, hand.joints]
+            self._holding[:, hand.actuators] = here @ hand.to_ctrl.T
+        told = np.concatenate([seen["goal"].reshape(len(qpos), -1), seen["vector"]], axis=1)
+        return told[:, None]
+
+    def controls(self, said: NDArray[Any]) -> NDArray[np.float64]:
+        """As `SongsVecEnv.controls`."""
+        ctrl: NDArray[np.float64] = self._holding + steps() * said[:, 0]
+        return ctrl
+
+    def rewards(self, played: Played, said: NDArray[Any]) -> NDArray[np.float64]:
+        """As `SongsVecEnv.rewards`: the paper's for keys; there are no fingertips to mimic."""
+        reward = press_reward(played.key_state, played.pressed, played.wanted, _HIT)
+        return reward[:, None]
+
+
+class _Actor(nn.Module):
+    """The mean of what an actor does, as a policy of one stage is asked for it."""
+
+    steps: Tensor
+
+    def __init__(self, scale: Scale, actor: Any) -> None:
+        super().__init__()
+        self.scale, self.body, self.mean = scale, actor.latent_pi, actor.mu
+        self.register_buffer("steps", torch.from_numpy(steps()).float())
+
+    def forward(self, goal: Tensor, vector: Tensor) -> Tensor:
+        """(B, 1, 46) what is added to the controls that hold the pose."""
+        told = torch.cat([goal.flatten(1), vector], dim=1)
+        said = torch.tanh(self.mean(self.body(self.scale(told))))
+        return (self.steps * said)[:, None]
+
+
+class _Scaled(SacVecEnv):
+    """What is seen, brought to a common size."""
+
+    scale: Scale | None = None
+
+    def look(self) -> NDArray[np.float32]:
+        """As `SongsVecEnv.look`."""
+        told = super().look()
+        if self.scale is None:
+            return told
+        scaled: NDArray[np.float32] = self.scale(torch.from_numpy(told)).numpy()
+        return scaled
+
+
+def steps() -> NDArray[np.float64]:
+    """(46,) what an action of 1 adds [rad, m]."""
+    one = np.full(CONTROLS // 2, _STEP)
+    one[20:] = _SLIDE
+    return np.tile(one, 2)
+
+
+def train_sac(
+    folders: Sequence[Path],
+    out: Path,
+    config: SacConfig,
+    threads: int = 0,
+    tell: Tell | None = None,
+) -> Path:
+    """Train; the result is `multi-task-sac.onnx` in the folder.
+
+    A training that was interrupted begins anew: what is remembered of the frames played is too much
+    to be written every now and then.
+
+    Args:
+        folders: of MIDI files.
+        out: folder.
+        config: how.
+        threads: of the physics; 0 for one on each core.
+        tell: told how far it is.
+
+    Raises:
+        InputError: the config or a song cannot be used, or the folder holds another training.
+        OSError: a file cannot be read or written.
+    """
+    check_sac(config)
+    digest = hashlib.sha256()
+    scores = []
+    for path in find_songs(folders):
+        digest.update(path.read_bytes())
+        scores.append(load_score(path, 0.0, config.seconds))
+    about = {"stage": STAGE, **dataclasses.asdict(config), "data": digest.hexdigest()[:16]}
+    path = out / STAGE
+    path.mkdir(parents=True, exist_ok=True)
+    result = out / f"{STAGE}.onnx"
+    with run_lock(path):
+        folder = FitFolder.open(path, about)
+        if folder.finished and result.exists():
+            return result
+        env = _Scaled([AskedSong.of(score) for score in scores], config, threads)
+        env.reseed(config.seed)
+        env.scale = _scale(env, config.seed)
+        model = SAC(
+            "MlpPolicy",
+            env,
+            learning_rate=config.learning_rate,
+            buffer_size=config.buffer,
+            learning_starts=10 * config.batch,
+            batch_size=config.batch,
+            gamma=config.discount,
+            gradient_steps=config.updates,
+            policy_kwargs={"net_arch": list(config.hidden)},
+            seed=config.seed,
+            device="cpu",
+        )
+        model.set_logger(Logger(None, []))
+        with closing(RunLog(folder.tensorboard, 1)) as log:
+            model.learn(config.frames, callback=_Told(config, log, tell))
+        actor = _Actor(env.scale, model.policy.actor).eval()
+        about = {
+            "stage": STAGE,
+            "level": "whole",
+            "prior": False,
+            "network": "mlp",
+            "chunk": 1,
+            "width": CONTROLS,
+        }
+        given = (torch.zeros(2, CHUNK, KEYS), torch.zeros(2, _VECTOR))
+        export_network(actor, given, ["goal", "vector"], ["said"], about, result)
+        weights = {name: tensor.numpy().copy() for name, tensor in actor.state_dict().items()}
+        folder.finish(weights, {})
+    return result
+
+
+class _Told(BaseCallback):
+    """Tells how far it is, and how much reward there was."""
+
+    def __init__(self, config: SacConfig, log: RunLog, tell: Tell | None) -> None:
+        super().__init__()
+        self._config, self._log, self._tell = config, log, tell
+        self._rewards: list[float] = []
+
+    def _on_step(self) -> bool:
+        self._rewards.append(float(self.locals["rewards"].mean()))
+        if len(self._rewards) == 200:
+            mean = float(np.mean(self._rewards))
+            self._rewards = []
+            self._log.add(self.num_timesteps, {"sac/reward": mean})
+            if self._tell is not None:
+                done = min(self.num_timesteps, self._config.frames)
+                self._tell(done, self._config.frames, f"reward {mean:.3f}")
+        return True
+
+
+def _scale(env: SacVecEnv, seed: int) -> Scale:
+    """What is usual, of worlds in which something is done by chance."""
+    draw = np.random.default_rng(seed)
+    env.reset()
+    shape = (env.num_envs, CONTROLS)
+    seen = []
+    for _ in range(_SCALED_BY):
+        env.play(draw.uniform(-1, 1, shape))
+        seen.append(env.look()[:, 0])
+    scale = Scale(CHUNK * KEYS + _VECTOR)
+    scale.fit(np.concatenate(seen))
+    # Keys that nobody happened to want are not unlike others.
+    scale.middle[: CHUNK * KEYS], scale.spread[: CHUNK * KEYS] = 0.0, 1.0
+    return scale
