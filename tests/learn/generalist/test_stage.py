@@ -17,7 +17,7 @@ from pianomime.learn.generalist.unet import FrameConvolution, TemporalEncoder
 from pianomime.learn.generalist.windows import Windows
 
 SEEN = ("goal", "frames", "vector")
-TINY = DiffusionConfig(channels=(16, 32, 32), condition=32, step_width=16)
+TINY = DiffusionConfig(channels=(16, 32, 32), condition=(32,), step_width=16)
 
 
 def a_stage(clips, name, size="small", **changes):

@@ -19,7 +19,7 @@ from pianomime.learn.goal.training import train_goal
 from pianomime.video.demonstration import Demonstration
 
 SHORT = FitConfig(steps=4, batch=8, warmup=1)
-TINY = DiffusionConfig(channels=(8, 8, 16), condition=16, step_width=8)
+TINY = DiffusionConfig(channels=(8, 8, 16), condition=(16,), step_width=8)
 
 
 @pytest.fixture(scope="module")

@@ -35,8 +35,10 @@ class DiffusionConfig:
     """Filters of the temporal convolutions over what is seen of the frames ahead."""
     encoder_kernel: int = 3
     """Of those."""
-    condition: int = 128
-    """Numbers into which all that is seen is brought together; 0 to leave it as it is."""
+    condition: tuple[int, ...] = (768, 768)
+    """Width of the layers that bring together all that is seen; none to leave it as it is."""
+    guess: bool = True
+    """Whether what is seen also says a chunk straight away, to which the U-Net adds."""
     step_width: int = 64
     """Numbers that tell the step of the diffusion."""
     steps: int = 100
@@ -114,7 +116,7 @@ _STAGES: dict[StageName, StageConfig] = {
 
 _PAPER = {
     "diffusion": DiffusionConfig(
-        channels=(256, 512, 1024), condition=0, step_width=256, prediction="epsilon"
+        channels=(256, 512, 1024), condition=(), guess=False, step_width=256, prediction="epsilon"
     ),
     "bet": BetConfig(layers=8, heads=8, width=120),
     "mlp": MlpConfig(hidden=(1024, 1024, 1024)),

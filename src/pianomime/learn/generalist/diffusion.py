@@ -9,6 +9,7 @@ from diffusers.schedulers import DDPMScheduler
 from torch import Tensor, nn
 
 from pianomime.learn.generalist.config import DiffusionConfig
+from pianomime.learn.generalist.mlp import hidden_layers
 from pianomime.learn.generalist.sizes import Sizes
 from pianomime.learn.generalist.unet import ConditionalUnet, TemporalEncoder
 
@@ -34,16 +35,17 @@ class DiffusionNet(nn.Module):
     def __init__(self, sizes: Sizes, config: DiffusionConfig) -> None:
         super().__init__()
         self.encoder = TemporalEncoder(sizes.frames, sizes.channels, config)
-        seen = self.encoder.width + sizes.vector
-        self.together = nn.Linear(seen, config.condition) if config.condition else nn.Identity()
-        self.unet = ConditionalUnet(sizes.chunk, sizes.width, config.condition or seen, config)
+        widths = (self.encoder.width + sizes.vector, *config.condition)
+        self.together = hidden_layers(widths)
+        self.unet = ConditionalUnet(sizes.chunk, sizes.width, widths[-1], config)
+        self.guess = nn.Linear(widths[-1], sizes.chunk * sizes.width) if config.guess else None
         self.config, self.schedule = config, noise_schedule(config)
 
     def forward(self, ahead: Tensor, vector: Tensor, noisy: Tensor, step: Tensor) -> Tensor:
         """(B, T, D): the noise in chunks (B, T, D) at steps (B,), or what is without it."""
-        seen = torch.cat([self.encoder(ahead), vector], dim=1)
-        out: Tensor = self.unet(noisy, step, self.together(seen))
-        return out
+        seen = self.together(torch.cat([self.encoder(ahead), vector], dim=1))
+        out: Tensor = self.unet(noisy, step, seen)
+        return out if self.guess is None else out + self.guess(seen).reshape(noisy.shape)
 
     def loss(self, ahead: Tensor, vector: Tensor, target: Tensor) -> Tensor:
         """Mean squared error at steps by chance."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import torch
@@ -21,23 +22,26 @@ class MlpNet(nn.Module):
 
     def __init__(self, sizes: Sizes, config: MlpConfig) -> None:
         super().__init__()
-        layers: list[nn.Module] = []
-        for before, after in pairwise(
-            (sizes.frames * sizes.channels + sizes.vector, *config.hidden)
-        ):
-            layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.GELU()]
-        self.layers = nn.Sequential(
-            *layers, nn.Linear(config.hidden[-1], sizes.chunk * sizes.width)
-        )
+        widths = (sizes.frames * sizes.channels + sizes.vector, *config.hidden)
+        self.layers = hidden_layers(widths)
+        self.last = nn.Linear(widths[-1], sizes.chunk * sizes.width)
         self.shape = (sizes.chunk, sizes.width)
 
     def forward(self, ahead: Tensor, vector: Tensor) -> Tensor:
         """(B, T, D)."""
         seen = torch.cat([ahead.flatten(1), vector], dim=1)
-        out: Tensor = self.layers(seen)
+        out: Tensor = self.last(self.layers(seen))
         return out.reshape(-1, *self.shape)
 
     def loss(self, ahead: Tensor, vector: Tensor, target: Tensor) -> Tensor:
         """Mean squared error."""
         said: Tensor = self(ahead, vector)
         return nn.functional.mse_loss(said.float(), target)
+
+
+def hidden_layers(widths: Sequence[int]) -> nn.Sequential:
+    """Layers from each width to the next."""
+    layers: list[nn.Module] = []
+    for before, after in pairwise(widths):
+        layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.GELU()]
+    return nn.Sequential(*layers)

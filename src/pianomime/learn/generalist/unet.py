@@ -76,7 +76,7 @@ class ConditionalUnet(nn.Module):
 
     def forward(self, noisy: Tensor, step: Tensor, condition: Tensor) -> Tensor:
         """(B, T, D) of noisy chunks (B, T, D) at steps (B,), seeing (B, condition)."""
-        told = torch.cat([condition, self.step(step)], dim=1)
+        told = nn.functional.mish(torch.cat([condition, self.step(step)], dim=1))
         x = noisy.transpose(1, 2)
         kept = []
         for level in self.down:
@@ -166,7 +166,7 @@ class _Block(nn.Module):
         super().__init__()
         self.first = _convolution(before, after, kernel, frames)
         self.second = _convolution(after, after, kernel, frames)
-        self.film = nn.Sequential(nn.Mish(), nn.Linear(told, 2 * after))
+        self.film = nn.Linear(told, 2 * after)
         self.past = FrameConvolution(before, after, 1, frames) if before != after else nn.Identity()
 
     def forward(self, x: Tensor, told: Tensor) -> Tensor:

@@ -1,0 +1,238 @@
+"""The paper's tables, ours beside theirs: every generalist on modern test12 and Etude-12.
+
+    PIANOMIME_WEIGHTS=out/generalist python benchmarks/paper_tables.py -o out/tables
+    python benchmarks/paper_tables.py --weights out/one out/two out/three --headline two-stage-diff
+
+Plays all songs of both sets with every method whose weights are there, thrice with other draws,
+and the headline method with the weights of each training as well. OUT then holds songs.csv (a row
+for each playing), tables.md (the main comparison, and tables 9 and 10) and methods.png. What was
+played before, by the same program and weights, is not played again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import statistics
+from pathlib import Path
+from typing import Any
+
+import common
+from pianomime.errors import InputError
+from pianomime.evaluation import evaluate
+from pianomime.files import atomic
+from pianomime.generalist.methods import FINGERS, METHODS, WEIGHTS, weight_files
+
+FIGURES = ("precision", "recall", "f1")
+SETS = {"modern test12": "modern/test12", "Etude-12": "etude12"}
+
+# Table 1 of the paper, and the means of its table 10: precision, recall and F1 of each set.
+PAPER: dict[str, dict[str, tuple[float, float, float]]] = {
+    "two-stage-diff": {"modern test12": (0.69, 0.54, 0.56), "Etude-12": (0.42, 0.31, 0.33)},
+    "two-stage-diff-res": {"modern test12": (0.71, 0.55, 0.57), "Etude-12": (0.43, 0.30, 0.32)},
+    "two-stage-diff-no-sdf": {"modern test12": (0.66, 0.49, 0.51)},
+    "two-stage-bet": {"modern test12": (0.53, 0.30, 0.31)},
+    "one-stage-diff": {"modern test12": (0.58, 0.27, 0.26)},
+    "bc-mse": {"modern test12": (0.54, 0.22, 0.21)},
+    "multi-task-sac": {"modern test12": (0.95, 0.18, 0.13)},
+}
+# Tables 9 and 10: F1 of each song, two-stage-diff and two-stage-diff-res. The names of the modern
+# songs are not known of the clips that we have; those of Etude-12 are.
+PAPER_ETUDE = {
+    "FrenchSuiteNo1Allemande": (0.34, 0.30),
+    "FrenchSuiteNo5Sarabande": (0.24, 0.19),
+    "PianoSonataD8451StMov": (0.52, 0.51),
+    "PartitaNo26": (0.24, 0.26),
+    "WaltzOp64No1": (0.33, 0.31),
+    "BagatelleOp3No4": (0.33, 0.32),
+    "KreislerianaOp16No8": (0.36, 0.36),
+    "FrenchSuiteNo5Gavotte": (0.33, 0.33),
+    "PianoSonataNo232NdMov": (0.25, 0.21),
+    "GolliwoggsCakewalk": (0.45, 0.42),
+    "PianoSonataNo21StMov": (0.25, 0.25),
+    "PianoSonataK279InCMajor1StMov": (0.35, 0.39),
+}
+
+Row = dict[str, Any]
+
+
+def play(
+    method: str, weights: Path | None, seed: int, effort: int, songs: str, arguments: Any
+) -> list[Row]:
+    """A row for each song of a set."""
+    if weights is not None:
+        os.environ[WEIGHTS] = str(weights)
+    results = evaluate(
+        common.shared() / "data" / SETS[songs],
+        method,
+        jobs=arguments.jobs,
+        out=arguments.output / "played",
+        effort=effort,
+        seed=seed,
+    )
+    for song in results["songs"]:
+        if "error" in song:
+            raise SystemExit(f"{method}, {song['song']}: {song['error']}")
+    mean = results["mean"]
+    print(f"{method} effort {effort} seed {seed} {songs}: F1 {mean['f1']:.3f}", flush=True)
+    return [
+        {
+            "method": method,
+            "effort": effort,
+            "weights": "" if weights is None else weights.name,
+            "seed": seed,
+            "set": songs,
+            "song": song["song"],
+            **{name: song[name] for name in (*FIGURES, "realtime_factor")},
+        }
+        for song in results["songs"]
+    ]
+
+
+def means(rows: list[Row], figure: str) -> list[float]:
+    """Over the songs of a set, of each playing."""
+    playings: dict[tuple[str, int], list[float]] = {}
+    for row in rows:
+        playings.setdefault((row["weights"], row["seed"]), []).append(row[figure])
+    return [statistics.mean(values) for values in playings.values()]
+
+
+def spread(values: list[float]) -> str:
+    """Mean and standard deviation."""
+    deviation = statistics.stdev(values) if len(values) > 1 else 0.0
+    return f"{statistics.mean(values):.3f} ± {deviation:.3f}"
+
+
+def comparison(rows: list[Row], players: list[tuple[str, int]]) -> str:
+    """The main table."""
+    lines = [
+        "| player | set | playings | precision | recall | F1 | the paper's P / R / F1 |",
+        "| --- | --- | ---: | ---: | ---: | ---: | --- |",
+    ]
+    for method, effort in players:
+        for songs in SETS:
+            mine = [
+                row
+                for row in rows
+                if (row["method"], row["effort"], row["set"]) == (method, effort, songs)
+            ]
+            cells = [spread(means(mine, figure)) for figure in FIGURES]
+            theirs = " / ".join(f"{value:.2f}" for value in PAPER.get(method, {}).get(songs, ()))
+            count = len(means(mine, "f1"))
+            name = f"{method}, effort {effort}"
+            lines.append(f"| {name} | {songs} | {count} | {' | '.join(cells)} | {theirs} |")
+    return "\n".join(lines)
+
+
+def by_song(rows: list[Row], songs: str, players: list[tuple[str, int]]) -> str:
+    """Table 9 or 10: F1 of each song."""
+    shown = [f"{method}, {effort}" for method, effort in players]
+    head = ["song", *shown]
+    etude = songs == "Etude-12"
+    if etude:
+        head += ["the paper's Diff", "its Diff-res"]
+    lines = [f"| {' | '.join(head)} |", f"| --- |{' ---: |' * (len(head) - 1)}"]
+    names = sorted({row["song"] for row in rows if row["set"] == songs})
+    for name in names:
+        cells = [name]
+        for method, effort in players:
+            f1 = [
+                row["f1"]
+                for row in rows
+                if (row["method"], row["effort"], row["song"]) == (method, effort, name)
+            ]
+            cells.append(f"{statistics.mean(f1):.2f}")
+        if etude:
+            cells += [f"{value:.2f}" for value in PAPER_ETUDE[name]]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def picture(rows: list[Row], players: list[tuple[str, int]], path: Path) -> None:
+    """Bars of F1 for each method, the paper's beside them."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.5), sharey=True, layout="constrained")
+    for axis, songs in zip(axes, SETS, strict=True):
+        for at, (method, effort) in enumerate(players):
+            mine = [
+                row
+                for row in rows
+                if (row["method"], row["effort"], row["set"]) == (method, effort, songs)
+            ]
+            ours = statistics.mean(means(mine, "f1"))
+            axis.barh(at - 0.2, ours, 0.4, color="tab:blue", label="ours" if not at else None)
+            axis.text(ours + 0.01, at - 0.2, f"{ours:.2f}", va="center", fontsize=8)
+            theirs = PAPER.get(method, {}).get(songs)
+            if theirs is not None:
+                label = "the paper's" if not at else None
+                axis.barh(at + 0.2, theirs[2], 0.4, color="lightgray", label=label)
+        axis.set(title=songs, xlim=(0, 1.08), xlabel="F1")
+        axis.set_yticks(range(len(players)), [f"{name} ({effort})" for name, effort in players])
+    axes[0].invert_yaxis()
+    axes[0].legend(loc="lower right")
+    with atomic(path) as temporary:
+        figure.savefig(temporary, dpi=120)
+    plt.close(figure)
+
+
+def main() -> None:
+    """Play, and write the tables."""
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument("-o", "--output", type=Path, default=common.ROOT / "out" / "tables")
+    options.add_argument("--weights", type=Path, nargs="+", help="folders, one a training")
+    options.add_argument("--headline", default="two-stage-diff", help="method of all trainings")
+    options.add_argument("--seeds", type=int, nargs="+", default=(0, 1, 2), help="of what is drawn")
+    options.add_argument("--effort", type=int, default=1, help="of methods that imitate")
+    options.add_argument("--efforts", type=int, nargs="+", default=(0, 1), help="of the others")
+    options.add_argument("--jobs", type=int, default=None, help="songs at the same time")
+    arguments = options.parse_args()
+    facts = common.machine()
+    common.show_machine(facts)
+    first, *others = arguments.weights or [None]
+    if first is not None:
+        os.environ[WEIGHTS] = str(first)
+    players: list[tuple[str, int]] = []
+    for method in METHODS:
+        try:
+            weight_files(method)
+        except InputError as error:
+            print(f"left out: {method} ({error})")
+        else:
+            players.append((method, arguments.effort))
+    players += [(name, effort) for effort in arguments.efforts for name in ("zero-shot", FINGERS)]
+    rows = []
+    for method, effort in players:
+        drawn = METHODS.get(method, ("",))[0] not in ("bc-mse", "multi-task-sac")
+        seeds = arguments.seeds if drawn and (method in METHODS or effort) else (0,)
+        for songs in SETS:
+            for seed in seeds:
+                rows += play(method, first, seed, effort, songs, arguments)
+            if method == arguments.headline:
+                for weights in others:
+                    rows += play(method, weights, seeds[0], effort, songs, arguments)
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    with (
+        atomic(arguments.output / "songs.csv") as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    tables = "\n\n".join(
+        [comparison(rows, players), *(by_song(rows, songs, players) for songs in SETS)]
+    )
+    with atomic(arguments.output / "tables.md") as temporary:
+        temporary.write_text(tables + "\n", encoding="utf-8")
+    picture(rows, players, arguments.output / "methods.png")
+    print(f"\n{tables}\n\nwritten: {arguments.output}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pianomime import Player
+from pianomime.errors import InputError
+from pianomime.generalist.methods import WEIGHTS
+from pianomime.learn.sac.config import SacConfig
+from pianomime.learn.sac.training import AskedSong, SacVecEnv, steps, train_sac
+
+SMALL = SacConfig(frames=200, worlds=2, updates=1, batch=8, buffer=400, hidden=(16,), seconds=2.0)
+
+
+def test_who_does_nothing_stays_where_it_is(two_notes):
+    env = SacVecEnv([AskedSong.of(two_notes.score)], SMALL, 1)
+    env.reset()
+    for _ in range(5):
+        env.step(np.zeros((2, 46), np.float32))
+    # But for what hangs down and springs back.
+    assert np.abs(env.worlds.qpos_hands).max() < 0.1
+
+
+def test_an_action_moves_an_actuator_by_its_step(two_notes):
+    env = SacVecEnv([AskedSong.of(two_notes.score)], SMALL, 1)
+    env.reset()
+    said = np.zeros((2, 1, 46))
+    held = env.controls(said)
+    said[:, 0, 7] = 1.0
+    moved = env.controls(said) - held
+    np.testing.assert_allclose(moved[:, 7], steps()[7])
+    np.testing.assert_allclose(np.delete(moved, 7, axis=1), 0.0)
+
+
+def test_what_was_trained_plays(two_notes, tmp_path, monkeypatch):
+    songs = tmp_path / "songs"
+    songs.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+    made = train_sac([songs], tmp_path / "out", SMALL, 1)
+    monkeypatch.setenv(WEIGHTS, str(tmp_path / "out"))
+    played = Player.from_name("multi-task-sac", 0).play(two_notes.score)
+    assert np.isfinite(played.ctrl).all()
+    written = made.stat().st_mtime_ns
+    train_sac([songs], tmp_path / "out", SMALL, 1)
+    assert made.stat().st_mtime_ns == written
+
+
+@pytest.mark.parametrize("change", [{"frames": 0}, {"buffer": 4}, {"discount": -0.1}])
+def test_settings_out_of_range_are_refused(two_notes, tmp_path, change):
+    two_notes.score.to_midi(tmp_path / "one.mid")
+    with pytest.raises(InputError):
+        train_sac([tmp_path], tmp_path / "out", replace(SMALL, **change), 1)
