@@ -21,7 +21,7 @@ class Train:
     Started again it goes on where it was. Set PIANOMIME_WEIGHTS=OUT to play with what is in OUT.
 
     Examples:
-      pianomime train high-diff --demonstrations demonstrations.npz
+      pianomime train high-diff --experts lessons.zarr
       pianomime train low-diff --experts lessons.zarr
       pianomime train low-diff-res --experts lessons.zarr more.zarr --fit.steps 50000
       pianomime train high-diff --size paper --demonstrations demos -o out/paper
@@ -30,9 +30,9 @@ class Train:
     stage: Annotated[tyro.conf.Positional[StageName], tyro.conf.arg(metavar="STAGE")]
     """Which network."""
     demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
-    """What high levels learn from: a folder of demonstrations, or published clips (.npz)."""
+    """What high levels learn from instead: a folder of demonstrations, or published ones (.npz)."""
     experts: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DATA...")] = ()
-    """What all others learn from: data sets that `pianomime teach` or `pianomime collect` made."""
+    """What is learned from: data sets that `pianomime teach` or `pianomime collect` made."""
     goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """The goal encoder; OUT/goal if not given."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")

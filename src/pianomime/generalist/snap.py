@@ -58,15 +58,29 @@ def snap(
         for row, column in zip(rows, columns, strict=True):
             if off[row, column] <= _FAR:
                 finger_key.reshape(10)[free[row]] = keys[column]
-    snapped = tips.copy()
-    snapped[..., 2] = HIGH
+    snapped = flat_heights(tips, finger_key)
     hand, finger = np.nonzero(finger_key >= 0)
     key = finger_key[hand, finger]
     snapped[hand, finger + 1, 1] = centres[key, 1]
-    snapped[hand, finger + 1, 2] = 0.0
     far, near = (
         centres[key, 0] + side * (key_half_sizes()[key, 0] - _EDGE) for side in (-1.0, 1.0)
     )
     far = np.where(BLACK[key], far, _BEFORE_BLACK)
     snapped[hand, finger + 1, 0] = np.clip(snapped[hand, finger + 1, 0], far, near)
     return snapped, finger_key
+
+
+def flat_heights(tips: NDArray[np.float64], finger_key: NDArray[np.int8]) -> NDArray[np.float64]:
+    """Points (..., 2, 6, 3) with heights that tell which fingers press (paper, appendix A, step 4).
+
+    Args:
+        tips: points [m].
+        finger_key: (..., 2, 5) the key that each finger presses, -1 for none.
+
+    Returns:
+        The points, at z = 0 where they press and high where not.
+    """
+    flat = tips.copy()
+    flat[..., 2] = HIGH
+    flat[..., 1:, 2][finger_key >= 0] = 0.0
+    return flat

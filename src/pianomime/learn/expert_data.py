@@ -18,7 +18,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -141,14 +141,22 @@ class ExpertData:
         """Number of episodes."""
         return len(self.ends)
 
-    def episode(self, number: int) -> Episode:
-        """One episode, in memory."""
+    def columns(self, number: int, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+        """Some columns of one episode, in memory."""
         first = int(self.ends[number - 1]) if number else 0
         rows = slice(first, int(self.ends[number]))
+        return {name: np.asarray(_array(self.group, name)[rows]) for name in names}
+
+    def episode(self, number: int) -> Episode:
+        """One episode, in memory."""
         about = self.episodes[number]
-        columns = {name: np.asarray(_array(self.group, name)[rows]) for name in COLUMNS}
         return Episode(
-            about["name"], about["f1"], about["prior"], columns, about["song"], about["split"]
+            about["name"],
+            about["f1"],
+            about["prior"],
+            self.columns(number, COLUMNS),
+            about["song"],
+            about["split"],
         )
 
 

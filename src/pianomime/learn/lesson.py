@@ -13,11 +13,14 @@ import os
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.generalist.methods import load_follower
+from pianomime.generalist.sampler import Sampler
+from pianomime.generalist.snap import flat_heights
 from pianomime.learn.episode import Episode, empty_columns, fill_columns
 from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson_config import LessonConfig, check_lessons
@@ -26,9 +29,15 @@ from pianomime.plan.hand_path import settled
 from pianomime.track import DynamicTracker, IkTracker
 from pianomime.world import World
 
+_QUICK = Sampler(steps=2)
+"""How a pilot is asked: what it says need not be the best, and there are many frames."""
+
 
 def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
     """Play a demonstration and write down the teacher's controls as `action`.
+
+    Its fingertips are first settled as the robot's hands can have them (`settled`): these are what
+    high levels learn to want, and low levels to reach.
 
     Args:
         clip: what to play.
@@ -40,12 +49,13 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
     """
     plan = clip.demonstration.plan
     teacher, prior = DynamicTracker(), IkTracker()
-    pilot = teacher if config.pilot is None else load_follower(config.pilot)
-    # What is shown are the human's fingertips; the teacher knows better what the robot's can do.
-    teacher.begin(settled(plan))
-    prior.begin(plan)
+    pilot = teacher if config.pilot is None else load_follower(config.pilot, _QUICK)
+    taught = settled(plan)
+    shown = replace(taught, fingertips=flat_heights(taught.fingertips, taught.finger_key))
+    teacher.begin(taught)
+    prior.begin(shown)
     if pilot is not teacher:
-        pilot.begin(plan)
+        pilot.begin(shown)
     draw = np.random.default_rng([config.seed, number])
     spread = config.noise * draw.random() * _reach()
     added = np.zeros(46)
@@ -58,13 +68,13 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
         columns["velocities"][frame] = world.qvel_hands
         columns["keys"][frame] = world.key_state
         columns["prior"][frame] = prior.control(frame, world)
-        columns["action"][frame] = taught = teacher.control(frame, world)
-        played = taught if pilot is teacher else pilot.control(frame, world)
+        columns["action"][frame] = said = teacher.control(frame, world)
+        played = said if pilot is teacher else pilot.control(frame, world)
         fresh = np.sqrt(1.0 - config.smooth**2) * draw.standard_normal(46)
         added = config.smooth * added + fresh
         world.step(played + spread * added, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
-    fill_columns(columns, goal, plan.fingertips, plan.finger_key)
+    fill_columns(columns, goal, shown.fingertips, shown.finger_key)
     f1 = frame_metrics(goal, columns["pressed"]).f1
     return Episode(clip.demonstration.score.title, f1, "ik", columns, clip.song)
 

@@ -79,7 +79,7 @@ def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
 
 def test_what_is_missing_is_named(data, tmp_path):
     config = replace(stage_config("high-diff"), fit=SHORT)
-    with pytest.raises(InputError, match="--demonstrations"):
+    with pytest.raises(InputError, match="--experts"):
         train_stage("high-diff", config, tmp_path, None, [], None)
     with pytest.raises(InputError, match="--experts"):
         train_stage("low-diff", stage_config("low-diff"), tmp_path, None, [], None)

@@ -144,10 +144,14 @@ def human_clips(source: Path) -> Clips:
     )
 
 
-def expert_clips(sources: Sequence[Path]) -> Clips:
+def expert_clips(sources: Sequence[Path], columns: Sequence[str] = EXPERT) -> Clips:
     """How experts play, or teachers would: the episodes of data sets that are for training.
 
     Episodes of different data sets are of one song where these tell the same number.
+
+    Args:
+        sources: data sets.
+        columns: which.
 
     Raises:
         InputError: a data set is not there, or values in it are not finite.
@@ -158,9 +162,9 @@ def expert_clips(sources: Sequence[Path]) -> Clips:
             data = ExpertData.open(source)
             for number, about in enumerate(data.episodes):
                 if about["split"] == "train":
-                    columns = data.episode(number).columns
+                    arrays = data.columns(number, columns)
                     song = about["song"] if about["song"] >= 0 else -number - 1
-                    yield about["name"], song, {name: columns[name] for name in EXPERT}
+                    yield about["name"], song, arrays
 
     return _together(", ".join(map(str, sources)), clips())
 

@@ -87,6 +87,9 @@ class StageConfig:
     hand_noise: float = 0.0
     """[m] Noise along the keyboard that is added to whole hands in training: from where they have
     strayed to they learn to come back."""
+    target_noise: float = 0.0
+    """[m] Noise that is added in training to the targets of hands and of idle fingertips: a high
+    level is only about right."""
     diffusion: DiffusionConfig = field(default_factory=DiffusionConfig)
     bet: BetConfig = field(default_factory=BetConfig)
     mlp: MlpConfig = field(default_factory=MlpConfig)
@@ -99,6 +102,7 @@ class StageConfig:
 
 
 _TIPS, _HANDS = 0.01, 0.06
+_TARGETS = 0.008
 
 _STAGES: dict[StageName, StageConfig] = {
     "high-diff": StageConfig("high", "diffusion", tip_noise=_TIPS, hand_noise=_HANDS),
@@ -106,10 +110,10 @@ _STAGES: dict[StageName, StageConfig] = {
         "high", "diffusion", "binary", tip_noise=_TIPS, hand_noise=_HANDS
     ),
     "high-bet": StageConfig("high", "bet", tip_noise=_TIPS, hand_noise=_HANDS),
-    "low-diff": StageConfig("low", "diffusion"),
-    "low-diff-no-sdf": StageConfig("low", "diffusion", "binary"),
-    "low-diff-res": StageConfig("low", "diffusion", prior=True),
-    "low-bet": StageConfig("low", "bet"),
+    "low-diff": StageConfig("low", "diffusion", target_noise=_TARGETS),
+    "low-diff-no-sdf": StageConfig("low", "diffusion", "binary", target_noise=_TARGETS),
+    "low-diff-res": StageConfig("low", "diffusion", prior=True, target_noise=_TARGETS),
+    "low-bet": StageConfig("low", "bet", target_noise=_TARGETS),
     "one-stage-diff": StageConfig("whole", "diffusion"),
     "bc-mse": StageConfig("whole", "mlp", "binary"),
 }

@@ -23,6 +23,9 @@ from pianomime.learn.generalist.diffusion import DiffusionNet
 from pianomime.learn.generalist.stage import Stage
 from pianomime.world.figures import KEYS
 
+_SMALL = 1024
+"""Numbers in a weight that is kept as it is."""
+
 
 def export_stage(stage: Stage, name: str, path: Path) -> None:
     """Write a stage as ONNX, whole or not at all.
@@ -77,6 +80,7 @@ def export_network(
             dynamo=False,
         )
         model = onnx.load(str(raw))
+    _halve(model)
     onnx.helper.set_model_props(
         model, {"about": json.dumps({"format": FORMAT, "version": VERSION, **about})}
     )
@@ -121,6 +125,24 @@ def about_stage(stage: Stage, name: str) -> dict[str, Any]:
             },
         }
     return about
+
+
+def _halve(model: Any) -> None:
+    """Keep weights in 16 bits, made 32 when the file is read: half the size, the same speed."""
+    import onnx
+
+    casts = []
+    for weight in model.graph.initializer:
+        values = onnx.numpy_helper.to_array(weight)
+        if values.dtype != np.float32 or values.size < _SMALL:
+            continue
+        name = weight.name
+        half = onnx.numpy_helper.from_array(values.astype(np.float16), f"{name}/half")
+        weight.CopyFrom(half)
+        casts.append(onnx.helper.make_node("Cast", [half.name], [name], to=onnx.TensorProto.FLOAT))
+    nodes = [*casts, *model.graph.node]
+    del model.graph.node[:]
+    model.graph.node.extend(nodes)
 
 
 class _Asked(nn.Module):

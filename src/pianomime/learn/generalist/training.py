@@ -14,7 +14,7 @@ from pianomime.errors import InputError
 from pianomime.generalist.features import base, to_world
 from pianomime.generalist.sampler import Sampler
 from pianomime.learn.fit import fit
-from pianomime.learn.generalist.clips import Clips, expert_clips, human_clips
+from pianomime.learn.generalist.clips import EXPERT, HUMAN, Clips, expert_clips, human_clips
 from pianomime.learn.generalist.config import StageConfig
 from pianomime.learn.generalist.export import export_stage, torch_policy
 from pianomime.learn.generalist.stage import Stage
@@ -42,7 +42,7 @@ def train_stage(
         name: of the stage.
         config: how.
         out: folder for it; `NAME.onnx` is the result, and `NAME` holds the training.
-        demonstrations: what high levels learn from, see `human_clips`.
+        demonstrations: what high levels learn from, see `human_clips`; `experts` if None.
         experts: what all others learn from, see `expert_clips`.
         goal: folder of the goal encoder, where it is used.
         tell: told how far it is.
@@ -85,13 +85,11 @@ def train_stage(
 
 
 def _data(config: StageConfig, demonstrations: Path | None, experts: Sequence[Path]) -> Clips:
-    if config.level == "high":
-        if demonstrations is None:
-            raise InputError("a high level learns from --demonstrations")
+    if config.level == "high" and demonstrations is not None:
         return human_clips(demonstrations)
     if not experts:
         raise InputError("it learns from --experts, data sets that `pianomime teach` makes")
-    return expert_clips(experts)
+    return expert_clips(experts, HUMAN if config.level == "high" else EXPERT)
 
 
 def _measure(held: Windows) -> Callable[[torch.nn.Module], dict[str, float]]:

@@ -69,6 +69,12 @@ class Windows:
             noise = draw.normal(0.0, self.config.tip_noise, (batch, 2, 6, 3))
             noise[:, :, 0, 1] += draw.normal(0.0, self.config.hand_noise, (batch, 2))
             sample["vector"] += noise.reshape(batch, TIPS).astype(np.float32)
+        elif self.config.level == "low":
+            # Alike in all frames of a chunk, and in where they are and how far that is off.
+            noise = draw.normal(0.0, self.config.target_noise, (batch, 1, 1, 12, 3))
+            frames = sample["frames"].reshape(batch, CHUNK, 2, 12, 3)
+            noise = noise * (frames[:, :, :1, :, 2:] > 0.0) * [1.0, 1.0, 0.0]
+            sample["frames"] = (frames + noise).reshape(batch, CHUNK, -1).astype(np.float32)
         return self._relative(sample)
 
     def some(self, number: int) -> Arrays:
