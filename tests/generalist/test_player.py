@@ -5,11 +5,13 @@ import pytest
 
 from pianomime import Player
 from pianomime.errors import InputError
-from pianomime.generalist.features import base
+from pianomime.generalist.features import base, from_wrists, to_world
 from pianomime.generalist.follower import Follower
 from pianomime.generalist.methods import METHODS, WEIGHTS
 from pianomime.generalist.player import Generalist
 from pianomime.music import Score
+from pianomime.plan import ZeroShotPlanner
+from pianomime.world import World
 from pianomime.world.figures import key_centres
 
 SCORE = Score([44, 25], [0.2, 0.4], [0.6, 0.8], [80, 80], pedal=np.zeros((0, 2)), title="two")
@@ -86,3 +88,25 @@ def test_without_weights_there_is_one_clear_line(method, tmp_path, monkeypatch):
     with pytest.raises(InputError, match="pianomime train") as error:
         Player.from_name(method)
     assert "\n" not in str(error.value)
+
+
+def test_a_follower_asked_twice_says_the_same():
+    """So a tracker that looks ahead can improve it."""
+
+    class Drawing(Still):
+        def say(self, seen, draw):
+            return super().say(seen, draw) + draw.normal(0, 0.1, (1, 4, 46))
+
+    plan = ZeroShotPlanner().plan(SCORE)
+    follower, world = Follower(Drawing("low")), World()
+    follower.begin(plan)
+    first = follower.control(3, world)
+    follower.control(4, world)
+    np.testing.assert_array_equal(follower.control(3, world), first)
+
+
+def test_what_is_told_from_wrists_is_taken_back():
+    points = np.random.default_rng(0).normal(size=(7, 2, 6, 3))
+    np.testing.assert_allclose(to_world(from_wrists(points)), points)
+    moved = from_wrists(points + [0.0, 0.3, 0.0])
+    np.testing.assert_allclose(moved[:, :, 1:], from_wrists(points)[:, :, 1:])

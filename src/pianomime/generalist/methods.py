@@ -36,7 +36,7 @@ WEIGHTS = "PIANOMIME_WEIGHTS"
 """Name of the environment variable that tells a folder of weights other than those that came with
 the program."""
 
-_SAMPLERS = ((5, 0.0), (10, 0.0), (20, 0.0), (100, 1.0))
+_SAMPLERS = ((2, 0.0), (5, 0.0), (20, 0.0), (100, 1.0))
 """Steps and eta of a `Sampler`, by effort; the last one is the paper's."""
 
 

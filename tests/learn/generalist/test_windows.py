@@ -88,3 +88,17 @@ def test_no_song_is_on_both_sides_of_the_split(clips):
     learned, held = many.split()
     assert not set(learned.song.tolist()) & set(held.song.tolist())
     assert len(learned) + len(held) == 3
+
+
+def test_noise_moves_the_targets_of_idle_fingertips_alone(clips):
+    made = windows(clips, "low-diff", transpose=False, target_noise=0.0)
+    noisy = windows(clips, "low-diff", transpose=False, target_noise=0.01)
+    clips.columns["fingertips"][:, 0, 2, 2] = 0.0
+    plain, moved = (one.draw(np.random.default_rng(0), 16)["frames"] for one in (made, noisy))
+    off = (moved - plain).reshape(16, 4, 2, 2, 6, 3)
+    np.testing.assert_allclose(off[..., 0, 2, :], 0, atol=1e-7)
+    np.testing.assert_allclose(off[..., 2], 0, atol=1e-7)
+    # Told alike as a place and as a distance, and in every frame of a chunk.
+    np.testing.assert_allclose(off[:, :, 0], off[:, :, 1], atol=1e-6)
+    np.testing.assert_allclose(off, np.repeat(off[:, :1], 4, axis=1), atol=1e-6)
+    assert off[..., 1, 3, 1].std() == pytest.approx(0.01, rel=0.6)

@@ -93,7 +93,7 @@ class StageConfig:
     diffusion: DiffusionConfig = field(default_factory=DiffusionConfig)
     bet: BetConfig = field(default_factory=BetConfig)
     mlp: MlpConfig = field(default_factory=MlpConfig)
-    fit: FitConfig = field(default_factory=lambda: FitConfig(steps=20_000, learning_rate=3e-4))
+    fit: FitConfig = field(default_factory=lambda: FitConfig(steps=5_000, learning_rate=1e-3))
 
     @property
     def chunk(self) -> int:
