@@ -189,7 +189,7 @@ def main() -> None:
     options.add_argument("--weights", type=Path, nargs="+", help="folders, one a training")
     options.add_argument("--headline", default="two-stage-diff", help="method of all trainings")
     options.add_argument("--seeds", type=int, nargs="+", default=(0, 1, 2), help="of what is drawn")
-    options.add_argument("--effort", type=int, default=1, help="of methods that imitate")
+    options.add_argument("--effort", type=int, default=0, help="of methods that imitate")
     options.add_argument("--efforts", type=int, nargs="+", default=(0, 1), help="of the others")
     options.add_argument("--jobs", type=int, default=None, help="songs at the same time")
     arguments = options.parse_args()

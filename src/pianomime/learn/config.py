@@ -117,8 +117,8 @@ class PpoConfig:
     """Largest."""
     target_kl: float = 0.0
     """Divergence that ends the passes of an update early; 0 for none."""
-    noise: float = 1.0
-    """Standard deviation of actions at the start."""
+    noise: float = 0.3
+    """Standard deviation of actions at the start; table 6 does not tell it."""
     evaluate_every: int = 1
     """Updates between evaluations."""
 
