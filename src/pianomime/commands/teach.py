@@ -22,12 +22,14 @@ class Teach:
 
     Demonstrations are played with noise on the controls, by the teacher or by a low level that was
     trained before (--pilot), and the teacher's controls in every moment are written down: so who
-    learns from them also learns to come back. OUT is a data set as `pianomime collect` makes it.
+    learns from them also learns to come back. With --planner a high level that was trained before
+    says where fingertips go. OUT is a data set as `pianomime collect` makes it.
 
     Examples:
       pianomime teach demonstrations.npz -o lessons.zarr
       pianomime train low-diff --experts lessons.zarr -o first
-      pianomime teach demonstrations.npz --pilot first/low-diff.onnx -o more.zarr
+      pianomime teach demonstrations.npz --pilot first/low-diff.onnx \
+        --planner first/high-diff.onnx -o more.zarr
       pianomime train low-diff --experts lessons.zarr more.zarr
     """
 
@@ -64,6 +66,8 @@ class Teach:
         from pianomime.learn.lesson import hold_lessons
 
         clips = read_human(self.demonstrations)
+        if self.config.most:
+            clips = clips[:: -(-len(clips) // self.config.most)]
         for done, episode in enumerate(hold_lessons(clips, self.config, self.jobs), 1):
             played.append(episode.f1)
             yield episode

@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.generalist.methods import load_follower
+from pianomime.generalist.policy import load_policy
 from pianomime.generalist.sampler import Sampler
 from pianomime.generalist.snap import flat_heights
+from pianomime.generalist.wanting import LearnedPlanner
 from pianomime.learn.episode import Episode, empty_columns, fill_columns
 from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson_config import LessonConfig, check_lessons
@@ -37,7 +39,8 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
     """Play a demonstration and write down the teacher's controls as `action`.
 
     Its fingertips are first settled as the robot's hands can have them (`settled`): these are what
-    high levels learn to want, and low levels to reach.
+    high levels learn to want, and low levels to reach. A high level's are shown as it says them,
+    and settled for the teacher alone.
 
     Args:
         clip: what to play.
@@ -50,8 +53,13 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
     plan = clip.demonstration.plan
     teacher, prior = DynamicTracker(), IkTracker()
     pilot = teacher if config.pilot is None else load_follower(config.pilot, _QUICK)
-    taught = settled(plan)
-    shown = replace(taught, fingertips=flat_heights(taught.fingertips, taught.finger_key))
+    if config.planner is None:
+        taught = settled(plan)
+        shown = replace(taught, fingertips=flat_heights(taught.fingertips, taught.finger_key))
+    else:
+        planner = LearnedPlanner(load_policy(config.planner, _QUICK), number)
+        shown = planner.plan(clip.demonstration.score)
+        taught = settled(shown)
     teacher.begin(taught)
     prior.begin(shown)
     if pilot is not teacher:
@@ -93,6 +101,8 @@ def hold_lessons(
         InputError: the config or the pilot cannot be used.
     """
     check_lessons(config)
+    if config.planner is not None:
+        load_policy(config.planner)
     if config.pilot is not None:
         load_follower(config.pilot)
     jobs = jobs or os.cpu_count() or 1

@@ -19,6 +19,10 @@ class LessonConfig:
     """Share of it that stays from one frame to the next."""
     pilot: Path | None = None
     """Low level (.onnx) whose controls are played; the teacher's if not given."""
+    planner: Path | None = None
+    """High level (.onnx) whose fingertips are shown; the human's if not given."""
+    most: int = 0
+    """Demonstrations, evenly taken from all; 0 for all."""
     seed: int = 0
     """Of what is drawn."""
 
@@ -31,3 +35,4 @@ def check_lessons(config: LessonConfig) -> None:
     """
     within("noise", config.noise, 0, 1)
     within("smooth", config.smooth, 0, 0.99)
+    within("most", config.most, 0)
