@@ -17,7 +17,7 @@ class TrainGoal:
 
     Goals that are near each other on the keyboard get codes that are near each other, which is what
     most networks of `pianomime train` are told of a goal. Some of the files are kept to measure on.
-    Started again with the same OUT it goes on where it was.
+    Started again with the same OUT it goes on where it was. OUT/codes.png shows the codes.
 
     Examples:
       pianomime train-goal MIDI_FOLDER

@@ -100,6 +100,7 @@ def test_training_measures_on_other_files_and_can_be_read(folder, tmp_path):
     keys = torch.from_numpy(goals.train.keys().astype(np.float32))
     codes = load_encoder(tmp_path / "goal")(keys)
     assert not codes.requires_grad
+    assert (tmp_path / "goal" / "codes.png").stat().st_size > 1000
     # What is finished is taken as it is.
     again, _ = train_goal([folder], tmp_path / "goal", config, quiet, quiet)
     assert again == figures

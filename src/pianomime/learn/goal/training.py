@@ -17,6 +17,7 @@ from pianomime.learn.fit import Batch, fit, load_arrays
 from pianomime.learn.goal.autoencoder import GoalAutoencoder, GoalEncoder
 from pianomime.learn.goal.config import GoalConfig, check_goal
 from pianomime.learn.goal.goals import GoalDraw, Goals, GoalSplit, read_goals
+from pianomime.learn.goal.picture import draw_codes
 from pianomime.learn.goal.sdf import KEYBOARD, QUERY_HIGH, QUERY_LOW, chamfer, distance
 from pianomime.learn.tell import Tell
 from pianomime.learn.tensors import read_tensors, write_tensors
@@ -77,6 +78,7 @@ def train_goal(
         module.encoder.standardise(_some(goals.train, _STANDARD))
     weights = {name: tensor.numpy() for name, tensor in module.state_dict().items()}
     write_tensors(out / _RESULT, weights, {"version": _VERSION, "octaves": config.octaves})
+    draw_codes(module.encoder, _some(goals.unseen, _MEASURED), out / "codes.png")
     return measure(module, goals.unseen), goals
 
 
