@@ -9,6 +9,7 @@ from pianomime.generalist.features import base, from_wrists, to_world
 from pianomime.generalist.follower import Follower
 from pianomime.generalist.methods import METHODS, WEIGHTS
 from pianomime.generalist.player import Generalist
+from pianomime.generalist.wanting import LearnedPlanner
 from pianomime.music import Score
 from pianomime.plan import ZeroShotPlanner
 from pianomime.world import World
@@ -110,3 +111,10 @@ def test_what_is_told_from_wrists_is_taken_back():
     np.testing.assert_allclose(to_world(from_wrists(points)), points)
     moved = from_wrists(points + [0.0, 0.3, 0.0])
     np.testing.assert_allclose(moved[:, :, 1:], from_wrists(points)[:, :, 1:])
+
+
+def test_a_song_that_is_planned_ahead_is_what_would_be_wanted_on_the_way():
+    ahead = LearnedPlanner(Pointing("high")).plan(SCORE)
+    way = play(Generalist(Follower(Still("low")), Pointing("high"))).plan
+    for name in ("fingertips", "finger_key", "note_hand", "note_finger"):
+        np.testing.assert_array_equal(getattr(ahead, name), getattr(way, name))

@@ -54,11 +54,12 @@ def test_lessons_are_the_same_however_many_are_held_at_once(two_notes):
 
 
 def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
-    two_notes.save(tmp_path / "demo.npz")
+    for number in range(5):
+        two_notes.save(tmp_path / f"{number}.npz")
     out = tmp_path / "lessons.zarr"
-    cli.main(["teach", str(tmp_path), "-o", str(out), "--jobs", "1"])
-    assert "played: 1," in capsys.readouterr().out
-    assert len(ExpertData.open(out)) == 1
+    cli.main(["teach", str(tmp_path), "-o", str(out), "--jobs", "1", "--most", "2"])
+    assert "played: 2," in capsys.readouterr().out
+    assert [about["song"] for about in ExpertData.open(out).episodes] == [0, 3]
 
 
 @pytest.mark.parametrize(
