@@ -19,6 +19,7 @@ METHODS: dict[str, tuple[str, ...]] = {
     "two-stage-diff-no-sdf": ("high-diff-no-sdf", "low-diff-no-sdf"),
     "two-stage-diff-res": ("high-diff", "low-diff-res"),
     "two-stage-bet": ("high-bet", "low-bet"),
+    "two-stage-mse": ("high-diff", "low-mse"),
     "one-stage-diff": ("one-stage-diff",),
     "bc-mse": ("bc-mse",),
     "multi-task-sac": ("multi-task-sac",),

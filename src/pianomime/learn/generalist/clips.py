@@ -70,8 +70,7 @@ class Clips:
 
     def split(self) -> tuple[Clips, Clips]:
         """To learn from, and to see how well that went: no song is on both sides."""
-        songs = np.unique(self.song)
-        held = np.isin(self.song, songs[_HELD_OUT // 2 :: _HELD_OUT])
+        held = _held(self.song)
         return self.some(~held), self.some(held)
 
 
@@ -119,6 +118,16 @@ def read_human(source: Path) -> list[HumanClip]:
     if not found:
         raise InputError(f"{source}: holds nothing to train on")
     return found
+
+
+def held_out(clips: Sequence[HumanClip]) -> list[HumanClip]:
+    """The clips that are kept from training, as `Clips.split` keeps those of all data sets."""
+    kept = _held(np.array([clip.song for clip in clips]))
+    return [clip for clip, one in zip(clips, kept, strict=True) if one]
+
+
+def _held(song: NDArray[np.int64]) -> NDArray[np.bool_]:
+    return np.isin(song, np.unique(song)[_HELD_OUT // 2 :: _HELD_OUT])
 
 
 def human_clips(source: Path) -> Clips:

@@ -17,6 +17,7 @@ StageName = Literal[
     "low-diff-no-sdf",
     "low-diff-res",
     "low-bet",
+    "low-mse",
     "one-stage-diff",
     "bc-mse",
 ]
@@ -114,6 +115,14 @@ _STAGES: dict[StageName, StageConfig] = {
     "low-diff-no-sdf": StageConfig("low", "diffusion", "binary", target_noise=_TARGETS),
     "low-diff-res": StageConfig("low", "diffusion", prior=True, target_noise=_TARGETS),
     "low-bet": StageConfig("low", "bet", target_noise=_TARGETS),
+    "low-mse": StageConfig(
+        "low",
+        "mlp",
+        "binary",
+        target_noise=_TARGETS,
+        mlp=MlpConfig((768, 768, 768)),
+        fit=FitConfig(steps=15_000, learning_rate=1e-3),
+    ),
     "one-stage-diff": StageConfig("whole", "diffusion"),
     "bc-mse": StageConfig("whole", "mlp", "binary"),
 }
