@@ -210,7 +210,7 @@ def main() -> None:
     rows = []
     for method, effort in players:
         drawn = METHODS.get(method, ("",))[0] not in ("bc-mse", "multi-task-sac")
-        seeds = arguments.seeds if drawn and (method in METHODS or effort) else (0,)
+        seeds = arguments.seeds if drawn and method in METHODS else (0,)
         for songs in SETS:
             for seed in seeds:
                 rows += play(method, first, seed, effort, songs, arguments)
