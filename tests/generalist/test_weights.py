@@ -28,7 +28,9 @@ def test_they_are_small() -> None:
     assert (weights_folder() / "README.md").is_file()
 
 
-@pytest.mark.parametrize(("name", "least"), [("fingers", 0.85), ("two-stage-diff", 0.3), ("two-stage-mse", 0.3)])
+@pytest.mark.parametrize(
+    ("name", "least"), [("fingers", 0.85), ("two-stage-diff", 0.3), ("two-stage-mse", 0.3)]
+)
 def test_they_play(score: Score, name: str, least: float) -> None:
     first, again = (Player.from_name(name, 0).play(score) for _ in range(2))
     assert first.metrics()["f1"] > least

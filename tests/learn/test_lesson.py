@@ -7,6 +7,7 @@ import pytest
 
 from pianomime import cli
 from pianomime.errors import InputError
+from pianomime.generalist.methods import weights_folder
 from pianomime.learn.expert_data import ExpertData
 from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson import hold_lesson, hold_lessons
@@ -68,6 +69,27 @@ def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
 def test_settings_out_of_range_are_refused(two_notes, config):
     with pytest.raises(InputError):
         next(hold_lessons([HumanClip(two_notes, 0)], config))
+
+
+def test_who_says_something_else_is_refused(two_notes):
+    clips = [HumanClip(two_notes, 0)]
+    weights = weights_folder()
+    for config in (
+        LessonConfig(pilot=weights / "high-diff.onnx"),
+        LessonConfig(pilot=weights / "fingers.onnx"),
+        LessonConfig(planner=weights / "low-diff.onnx"),
+    ):
+        with pytest.raises(InputError, match="not a stage"):
+            next(hold_lessons(clips, config))
+
+
+def test_a_high_level_and_a_pilot_hold_a_lesson(two_notes):
+    weights = weights_folder()
+    config = LessonConfig(pilot=weights / "low-mse.onnx", planner=weights / "high-diff.onnx")
+    shown, usual = (hold_lesson(HumanClip(two_notes, 0), 0, one) for one in (config, QUIET))
+    assert not np.array_equal(shown.columns["fingertips"], usual.columns["fingertips"])
+    np.testing.assert_array_equal(shown.columns["goal"], usual.columns["goal"])
+    assert np.isfinite(shown.columns["action"]).all()
 
 
 def test_a_pilot_that_is_no_low_level_is_refused(two_notes, tmp_path):

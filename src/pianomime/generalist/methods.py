@@ -89,14 +89,14 @@ def load_follower(path: Path, sampler: Sampler | None = None, seed: int = 0) -> 
     """The tracker of a file of a low level, or of a policy of one stage.
 
     Raises:
-        InputError: it is damaged, or a high level.
+        InputError: it is damaged, or says something else than controls.
     """
     from pianomime.generalist.follower import Follower
     from pianomime.generalist.policy import load_policy
 
     policy = load_policy(path, sampler)
-    if policy.about["level"] == "high":
-        raise InputError(f"{path}: says fingertips, not controls")
+    if policy.about["level"] not in ("low", "whole"):
+        raise InputError(f"{path}: not a stage that says controls")
     return Follower(policy, seed, policy.about["level"] == "low", policy.about["prior"])
 
 

@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.errors import InputError
 from pianomime.generalist.methods import load_follower
 from pianomime.generalist.policy import load_policy
 from pianomime.generalist.sampler import Sampler
@@ -98,11 +99,11 @@ def hold_lessons(
         jobs: processes; one a core if None.
 
     Raises:
-        InputError: the config or the pilot cannot be used.
+        InputError: the config, the pilot or the planner cannot be used.
     """
     check_lessons(config)
-    if config.planner is not None:
-        load_policy(config.planner)
+    if config.planner is not None and load_policy(config.planner).about["level"] != "high":
+        raise InputError(f"{config.planner}: not a stage that says fingertips")
     if config.pilot is not None:
         load_follower(config.pilot)
     jobs = jobs or os.cpu_count() or 1
