@@ -174,7 +174,7 @@ def picture(rows: list[Row], players: list[tuple[str, int]], path: Path) -> None
         axis.set(title=songs, xlim=(0, 1.08), xlabel="F1")
         axis.set_yticks(range(len(players)), [f"{name} ({effort})" for name, effort in players])
     axes[0].invert_yaxis()
-    axes[0].legend(loc="lower right")
+    axes[0].legend(loc="center right")
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=120)
     plt.close(figure)
