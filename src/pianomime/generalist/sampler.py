@@ -61,7 +61,8 @@ def take_noise_off(
     """
     left = signal(steps)
     x = noise.astype(np.float64)
-    times = np.round(np.arange(steps, 0, -steps / sampler.steps)).astype(np.int64) - 1
+    calls = np.arange(sampler.steps)
+    times = np.round(steps - calls * steps / sampler.steps).astype(np.int64) - 1
     for now, after in zip(times, [*times[1:], -1], strict=True):
         said = denoise(x.astype(np.float32), np.full(len(x), now, np.int64))
         here, there = left[now], left[after] if after >= 0 else 1.0

@@ -8,6 +8,7 @@ import pytest
 from pianomime.generalist.features import base, octave, rest_tips, to_world
 from pianomime.learn.generalist.config import STAGES, stage_config
 from pianomime.learn.generalist.windows import Windows
+from pianomime.world.hand import SIDES, Hand
 
 
 def windows(clips, stage, **changes):
@@ -60,8 +61,16 @@ def test_an_octave_up_everything_is_an_octave_up(clips):
     np.testing.assert_allclose(off[:, :, 0, :, 1], octave(), atol=1e-6)
     np.testing.assert_allclose(off[:, :, 1], 0, atol=1e-6)
     moved = said(made, up) - said(made, here)
-    np.testing.assert_allclose(moved[..., [20, 43]], -octave(), atol=1e-5)
+    np.testing.assert_allclose(moved[..., [20, 43]], octave(), atol=1e-5)
     np.testing.assert_allclose(np.delete(moved, [20, 43], axis=-1), 0, atol=1e-5)
+    # Where points are told to be, the joints have them.
+    joints, tips = up["vector"][:, :54], up["vector"][:, -36:].reshape(2, 2, 6, 3)
+    for index, side in enumerate(SIDES):
+        hand = Hand(side)
+        first = hand.joints.start - 88
+        for row in range(2):
+            points = hand.points(joints[row, first : first + 27])
+            np.testing.assert_allclose(points, tips[row, index], atol=1e-5)
     # What holds the pose moves with it: what is learned is the same.
     np.testing.assert_allclose(here["target"], up["target"], atol=1e-5)
 

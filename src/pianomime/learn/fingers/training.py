@@ -123,7 +123,7 @@ def _model(env: FingersVecEnv, config: FingersConfig) -> Ppo:
     return Ppo(
         "MlpPolicy",
         env,
-        learning_rate=lambda left: config.learning_rate * left,
+        learning_rate=lambda left: config.learning_rate * max(left, 0.0),
         n_steps=steps,
         batch_size=config.batch,
         n_epochs=config.epochs,

@@ -27,7 +27,7 @@ from pianomime.world.hand import SIDES, Hand
 
 _OCTAVE = 12
 _SLIDES = (0, HAND_JOINTS)
-"""Joints that carry the forearms along the keyboard, right and left; y falls as they rise."""
+"""Joints that carry the forearms along the keyboard, right and left; y rises as they do."""
 _SLIDE_CONTROLS = (20, 43)
 
 
@@ -183,7 +183,7 @@ def _slid(
     """Joints or controls (B, ..., D) of forearms that are moved along the keyboard by (B,) [m]."""
     moved = values.copy()
     for slide in slides:
-        moved[..., slide] -= off.reshape(-1, *[1] * (values.ndim - 2))
+        moved[..., slide] += off.reshape(-1, *[1] * (values.ndim - 2))
     return moved
 
 
