@@ -19,6 +19,7 @@ from pianomime.learn.goal.training import train_goal
 from pianomime.video.demonstration import Demonstration
 
 SHORT = FitConfig(steps=4, batch=8, warmup=1)
+NO_SDF = stage_config("high-diff-no-sdf")
 TINY = DiffusionConfig(channels=(8, 8, 16), condition=(16,), step_width=8)
 
 
@@ -85,8 +86,13 @@ def test_what_is_missing_is_named(data, tmp_path):
         train_stage("low-diff", stage_config("low-diff"), tmp_path, None, [], None)
     with pytest.raises(InputError, match="does not exist"):
         train_stage("high-diff", config, tmp_path, data / "demos", [], tmp_path / "none")
+    (tmp_path / "alone").mkdir()
+    (tmp_path / "alone" / "0.npz").write_bytes((data / "demos" / "00.npz").read_bytes())
+    with pytest.raises(InputError, match="two songs"):
+        train_stage("high-diff-no-sdf", NO_SDF, tmp_path, tmp_path / "alone", [], None)
+    (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="nothing to train on"):
-        train_stage("high-diff", config, tmp_path, tmp_path, [], None)
+        train_stage("high-diff", config, tmp_path, tmp_path / "empty", [], None)
 
 
 def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):

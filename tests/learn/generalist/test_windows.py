@@ -95,6 +95,8 @@ def test_the_same_seed_draws_the_same(clips, stage):
 def test_no_song_is_on_both_sides_of_the_split(clips):
     many = replace(clips, song=np.array([1, 1, 2]))
     learned, held = many.split()
+    assert len(learned)
+    assert len(held)
     assert not set(learned.song.tolist()) & set(held.song.tolist())
     assert len(learned) + len(held) == 3
 

@@ -127,7 +127,8 @@ def held_out(clips: Sequence[HumanClip]) -> list[HumanClip]:
 
 
 def _held(song: NDArray[np.int64]) -> NDArray[np.bool_]:
-    return np.isin(song, np.unique(song)[_HELD_OUT // 2 :: _HELD_OUT])
+    songs = np.unique(song)
+    return np.isin(song, songs[min(_HELD_OUT // 2, len(songs) // 2) :: _HELD_OUT])
 
 
 def human_clips(source: Path) -> Clips:

@@ -62,6 +62,8 @@ def train_stage(
         from pianomime.learn.goal.training import load_encoder
 
         encoder = load_encoder(goal)
+    if len(set(clips.song.tolist())) < 2:
+        raise InputError("two songs at least are needed, one of them to measure on")
     learned, held = (Windows.of(some, config) for some in clips.split())
     sample = learned.some(_SCALED_BY)
     torch.manual_seed(config.fit.seed)
