@@ -27,7 +27,7 @@ class Teach:
 
     Examples:
       pianomime teach demonstrations.npz -o lessons.zarr
-      pianomime train low-diff --experts lessons.zarr -o first
+      pianomime train low-diff --experts lessons.zarr -o first --goal out/generalist/goal
       pianomime teach demonstrations.npz --pilot first/low-diff.onnx \
         --planner first/high-diff.onnx -o more.zarr
       pianomime train low-diff --experts lessons.zarr more.zarr
