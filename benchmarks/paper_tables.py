@@ -90,6 +90,11 @@ def play(
     ]
 
 
+def some(rows: list[Row], **wanted: Any) -> list[Row]:
+    """The rows that have these values."""
+    return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
+
+
 def means(rows: list[Row], figure: str) -> list[float]:
     """Over the songs of a set, of each playing."""
     playings: dict[tuple[str, int], list[float]] = {}
@@ -112,11 +117,7 @@ def comparison(rows: list[Row], players: list[tuple[str, int]]) -> str:
     ]
     for method, effort in players:
         for songs in SETS:
-            mine = [
-                row
-                for row in rows
-                if (row["method"], row["effort"], row["set"]) == (method, effort, songs)
-            ]
+            mine = some(rows, method=method, effort=effort, set=songs)
             cells = [spread(means(mine, figure)) for figure in FIGURES]
             theirs = " / ".join(f"{value:.2f}" for value in PAPER.get(method, {}).get(songs, ()))
             count = len(means(mine, "f1"))
@@ -137,12 +138,8 @@ def by_song(rows: list[Row], songs: str, players: list[tuple[str, int]]) -> str:
     for name in names:
         cells = [name]
         for method, effort in players:
-            f1 = [
-                row["f1"]
-                for row in rows
-                if (row["method"], row["effort"], row["song"]) == (method, effort, name)
-            ]
-            cells.append(f"{statistics.mean(f1):.2f}")
+            mine = some(rows, method=method, effort=effort, song=name)
+            cells.append(f"{statistics.mean(row['f1'] for row in mine):.2f}")
         if etude:
             cells += [f"{value:.2f}" for value in PAPER_ETUDE[name]]
         lines.append(f"| {' | '.join(cells)} |")
@@ -159,11 +156,7 @@ def picture(rows: list[Row], players: list[tuple[str, int]], path: Path) -> None
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.5), sharey=True, layout="constrained")
     for axis, songs in zip(axes, SETS, strict=True):
         for at, (method, effort) in enumerate(players):
-            mine = [
-                row
-                for row in rows
-                if (row["method"], row["effort"], row["set"]) == (method, effort, songs)
-            ]
+            mine = some(rows, method=method, effort=effort, set=songs)
             ours = statistics.mean(means(mine, "f1"))
             axis.barh(at - 0.2, ours, 0.4, color="tab:blue", label="ours" if not at else None)
             axis.text(ours + 0.01, at - 0.2, f"{ours:.2f}", va="center", fontsize=8)

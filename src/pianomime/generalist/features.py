@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.world.figures import HAND_ACTUATORS, HAND_JOINTS, KEYS, key_centres
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import both_hands, hand_points
 
 TIPS = 36
 """Numbers of both hands' points, (2, 6, 3) in a row."""
@@ -89,7 +90,7 @@ def low_inputs(
 @cache
 def rest_tips() -> NDArray[np.float64]:
     """(2, 6, 3) [m] where the points are at rest; read-only."""
-    tips = np.array([Hand(side).points(np.zeros(HAND_JOINTS)) for side in SIDES])
+    tips: NDArray[np.float64] = hand_points(np.zeros((1, JOINTS)))[0]
     tips.setflags(write=False)
     return tips
 
@@ -115,15 +116,21 @@ def base(level: str, prior: bool, vector: NDArray[np.float32]) -> NDArray[np.flo
         return np.zeros((len(vector), 1, TIPS), np.float32)
     if prior:
         return np.zeros((len(vector), 1, CONTROLS), np.float32)
-    return (vector[:, :JOINTS] @ _holding().T)[:, None]
+    held: NDArray[np.float32] = holding(vector[:, :JOINTS])[:, None]
+    return held
+
+
+def holding(joints: NDArray[Any]) -> NDArray[Any]:
+    """(B, 46) the controls that hold joints (B, 54), without load [rad, m]; in their precision."""
+    held: NDArray[Any] = joints @ _to_controls().T
+    return held
 
 
 @cache
-def _holding() -> NDArray[np.float32]:
+def _to_controls() -> NDArray[np.float32]:
     """(46, 54) from joints to the controls that hold them, without load."""
     matrix = np.zeros((CONTROLS, JOINTS), np.float32)
-    for side in SIDES:
-        hand = Hand(side)
+    for hand in both_hands():
         joints = slice(hand.joints.start - KEYS, hand.joints.stop - KEYS)
         matrix[hand.actuators, joints] = hand.to_ctrl
     return matrix

@@ -6,8 +6,6 @@ mirror, so that there are ten times as many moments to learn from, and no song i
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +23,7 @@ from pianomime.world.figures import (
     KEYS,
     key_centres,
 )
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import both_hands
 
 ACTIONS = 5
 """Numbers that a finger says: of its actuators, of which some fingers have fewer."""
@@ -119,7 +117,7 @@ class Surroundings:
             told[..., at + 2 * index + 1] = row[:, 2:]
         at += 4
         for index in range(2):
-            hand = _hands()[index]
+            hand = both_hands()[index]
             joints = qpos[hand.joints]
             first = hand.joints.start - KEYS
             velocity = qvel_hands[first : first + HAND_JOINTS]
@@ -138,7 +136,7 @@ def controls(said: NDArray[np.floating]) -> NDArray[np.float64]:
     """(46,) what fingers' actions (10, 5), -1..1, add to controls [rad]."""
     added = np.zeros(46)
     for row, action in enumerate(np.clip(said, -1.0, 1.0)):
-        hand, which = _hands()[row // 5], FINGER_ACTUATORS[row % 5]
+        hand, which = both_hands()[row // 5], FINGER_ACTUATORS[row % 5]
         mine = added[hand.actuators]
         mine[which] = REACH * action[: which.stop - which.start]
     return added
@@ -167,8 +165,3 @@ class FingerTracker:
         )
         ctrl: NDArray[np.float64] = proposed[0] + controls(self._run({"told": told})[0])
         return ctrl
-
-
-@cache
-def _hands() -> tuple[Hand, ...]:
-    return tuple(Hand(side) for side in SIDES)

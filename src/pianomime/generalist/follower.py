@@ -12,7 +12,7 @@ from pianomime.plan import FingertipPlan
 from pianomime.track import IkTracker
 from pianomime.world import World
 from pianomime.world.figures import KEYS
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import hand_points
 
 
 class Follower:
@@ -30,7 +30,6 @@ class Follower:
     ) -> None:
         self._policy, self._seed, self._fingertips = policy, seed, fingertips
         self._ik = IkTracker() if prior else None
-        self._hands = [Hand(side) for side in SIDES]
 
     def begin(self, plan: FingertipPlan) -> None:
         """Take the plan's fingertips, and the keys that it presses as goals."""
@@ -38,10 +37,6 @@ class Follower:
         self._goal = np.vstack([plan.keys(), np.zeros((CHUNK - 1, KEYS), bool)])
         if self._ik is not None:
             self._ik.begin(plan)
-
-    def points(self, world: World) -> NDArray[np.float64]:
-        """(2, 6, 3) where forearms and fingertips are [m]."""
-        return np.array([hand.points(world.qpos[hand.joints]) for hand in self._hands])
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) right then left."""
@@ -61,11 +56,12 @@ class Follower:
             targets: (4, 2, 6, 3) where fingertips are to be in these frames [m].
         """
         prior = None if self._ik is None else self._ik.control(frame, world)
+        joints = world.qpos_hands[None]
         seen = low_inputs(
             goal[None],
             targets[None] if self._fingertips else None,
-            self.points(world)[None],
-            world.qpos_hands[None],
+            hand_points(joints),
+            joints,
             world.qvel_hands[None],
             world.key_state[None],
             None if prior is None else prior[None],

@@ -18,6 +18,7 @@ from pianomime.music import Score
 from pianomime.plan import NO_KEY, FingertipPlan
 from pianomime.world import World
 from pianomime.world.figures import KEYS
+from pianomime.world.hand import hand_points
 
 
 class Generalist:
@@ -50,7 +51,7 @@ class Generalist:
         plan = self._plan
         if self._wanting is None:
             # Nothing was planned: what is nearest is taken for what presses.
-            tips = self._follower.points(world)
+            tips = hand_points(world.qpos_hands[None])[0]
             _, self._pressing = snap(tips, self._goal[frame], self._pressing)
             plan.fingertips[frame], plan.finger_key[frame] = tips, self._pressing
             targets = np.repeat(tips[None], CHUNK, axis=0)

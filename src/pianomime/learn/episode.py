@@ -94,9 +94,7 @@ def play_episode(run: RunFolder) -> Episode:
     columns = empty_columns(len(plan))
     pedal_tracker = tracker if isinstance(tracker, PedalTracker) else None
     for frame in range(len(plan)):
-        columns["joints"][frame] = world.qpos_hands
-        columns["velocities"][frame] = world.qvel_hands
-        columns["keys"][frame] = world.key_state
+        write_state(columns, frame, world)
         columns["prior"][frame] = prior.control(frame, world)
         ctrl = tracker.control(frame, world)
         columns["action"][frame] = ctrl
@@ -104,8 +102,7 @@ def play_episode(run: RunFolder) -> Episode:
             pedal[frame] = pedal_tracker.pedal(frame)
         world.step(ctrl, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
-    fill_columns(columns, goal, plan.fingertips, plan.finger_key)
-    f1 = frame_metrics(goal, columns["pressed"]).f1
+    f1 = fill_columns(columns, goal, plan.fingertips, plan.finger_key)
     return Episode(run.song.score.title, f1, run.config.env.prior, columns)
 
 
@@ -158,8 +155,7 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         finger_key = human["finger_key"][theirs].astype(np.int8)
         columns["prior"][:] = _ik_prior(tips, columns["joints"], keys)
         goal = np.unpackbits(human["goal_packed"][theirs], axis=1)[:, :KEYS].astype(bool)
-        fill_columns(columns, goal, tips, finger_key)
-        f1 = frame_metrics(goal, columns["pressed"]).f1
+        f1 = fill_columns(columns, goal, tips, finger_key)
         name = f"clip{clip:03d}"
         of_song, part = int(song[place[clip]]), str(split[place[clip]])
         yield Episode(name, f1, "ik", columns, of_song, part), len(ends)
@@ -197,12 +193,20 @@ def fill_columns(
     goal: NDArray[np.bool_],
     tips: NDArray[np.float64],
     finger_key: NDArray[np.int8],
-) -> None:
-    """Write what the plan tells, and the residual, into columns that have all else."""
+) -> float:
+    """Write what the plan tells, and the residual, into columns that have all else; their F1."""
     columns["goal"][:] = goal
     columns["fingertips"][:] = tips
     columns["finger_key"][:] = finger_key
     columns["residual"][:] = columns["action"] - columns["prior"]
+    return frame_metrics(goal, columns["pressed"]).f1
+
+
+def write_state(columns: dict[str, NDArray[Any]], frame: int, world: World) -> None:
+    """Write the world as it is before a frame."""
+    columns["joints"][frame] = world.qpos_hands
+    columns["velocities"][frame] = world.qvel_hands
+    columns["keys"][frame] = world.key_state
 
 
 def _arrays(path: Path, names: str, more: str = "") -> dict[str, NDArray[Any]]:

@@ -16,7 +16,6 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.generalist.methods import load_follower
@@ -24,16 +23,19 @@ from pianomime.generalist.policy import load_policy
 from pianomime.generalist.sampler import Sampler
 from pianomime.generalist.snap import flat_heights
 from pianomime.generalist.wanting import LearnedPlanner
-from pianomime.learn.episode import Episode, empty_columns, fill_columns
+from pianomime.learn.episode import Episode, empty_columns, fill_columns, write_state
 from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson_config import LessonConfig, check_lessons
-from pianomime.music import frame_metrics
 from pianomime.plan.hand_path import settled
 from pianomime.track import DynamicTracker, IkTracker
 from pianomime.world import World
+from pianomime.world.hand import by_actuator
 
 _QUICK = Sampler(steps=2)
 """How a pilot is asked: what it says need not be the best, and there are many frames."""
+
+_REACH = by_actuator(1.0, 0.3, 0.03)
+"""Noise [rad, m] of actuators that moves fingertips as 1 rad of a finger's does."""
 
 
 def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
@@ -66,16 +68,14 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
     if pilot is not teacher:
         pilot.begin(shown)
     draw = np.random.default_rng([config.seed, number])
-    spread = config.noise * draw.random() * _reach()
+    spread = config.noise * draw.random() * _REACH
     added = np.zeros(46)
     goal = clip.demonstration.score.roll()
     pedal = clip.demonstration.score.pedal_roll()
     columns = empty_columns(len(plan))
     world = World(quiet=True)
     for frame in range(len(plan)):
-        columns["joints"][frame] = world.qpos_hands
-        columns["velocities"][frame] = world.qvel_hands
-        columns["keys"][frame] = world.key_state
+        write_state(columns, frame, world)
         columns["prior"][frame] = prior.control(frame, world)
         columns["action"][frame] = said = teacher.control(frame, world)
         played = said if pilot is teacher else pilot.control(frame, world)
@@ -83,8 +83,7 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
         added = config.smooth * added + fresh
         world.step(played + spread * added, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
-    fill_columns(columns, goal, shown.fingertips, shown.finger_key)
-    f1 = frame_metrics(goal, columns["pressed"]).f1
+    f1 = fill_columns(columns, goal, shown.fingertips, shown.finger_key)
     return Episode(clip.demonstration.score.title, f1, "ik", columns, clip.song)
 
 
@@ -124,10 +123,3 @@ def hold_lessons(
                 yield waiting.popleft().result()
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _reach() -> NDArray[np.float64]:
-    """(46,) noise [rad, m] of actuators that moves fingertips as 1 rad of a finger's does."""
-    one = np.ones(23)
-    one[:2], one[20:] = 0.3, 0.03
-    return np.tile(one, 2)

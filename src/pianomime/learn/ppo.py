@@ -14,19 +14,11 @@ from typing import Any
 
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from pianomime.learn.config import PpoConfig
 from pianomime.learn.policy import ACTIVATIONS, PolicyTracker
-from pianomime.learn.ppo_model import (
-    Ppo,
-    actor_network,
-    model_arrays,
-    resume_model,
-    seed_update,
-    torch_threads,
-)
+from pianomime.learn.ppo_model import Boundary, Ppo, actor_network, torch_threads
 from pianomime.learn.run_folder import Evaluation, RunFolder
 from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_vec_env import SongVecEnv
@@ -56,7 +48,9 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
     boundary.init_callback(model)
     state = run.state()
     if state is not None:
-        boundary.resume(*state)
+        arrays, about = state
+        boundary.curve = [Evaluation(**row) for row in about["curve"]]
+        boundary.resume(arrays, int(about["steps"]), run.path)
     # Steps that were taken before are added to those that it is told.
     model.learn(
         run.config.steps - model.num_timesteps,
@@ -109,43 +103,24 @@ def make_model(env: SongVecEnv, settings: PpoConfig, seed: int, threads: int = 0
     return model
 
 
-class _Boundary(BaseCallback):
-    """What happens between updates: evaluate, keep the best, write a checkpoint, seed anew."""
+class _Boundary(Boundary):
+    """Evaluates, keeps the best and writes a checkpoint."""
 
     def __init__(self, run: RunFolder, env: SongVecEnv, tell: Tell) -> None:
-        super().__init__()
-        self._run, self._env, self._tell = run, env, tell
-        self._curve: list[Evaluation] = []
-        self._fresh = True
+        super().__init__(env, run.config.seed, run.config.ppo.steps_per_update)
+        self._run, self._tell = run, tell
+        self.curve: list[Evaluation] = []
 
-    def resume(self, arrays: Arrays, about: dict[str, Any]) -> None:
-        """Put model and environments where a checkpoint has them."""
-        self._curve = [Evaluation(**row) for row in about["curve"]]
-        self.model.num_timesteps = int(about["steps"])
-        self._env.resume(resume_model(self.model, arrays, self._run.path))
-        self._fresh = False
-
-    def between_updates(self) -> None:
-        """Evaluate and write what has been learned; begin the next update the same each time."""
-        steps = self.model.num_timesteps
-        update = steps // self._run.config.ppo.steps_per_update
-        # A checkpoint that was just read needs not be written again.
-        if self._fresh:
-            self._env.batch.set_state(self._env.batch.state())
-            due = update % self._run.config.ppo.evaluate_every == 0
-            if due or steps >= self._run.config.steps:
-                self._evaluate(steps)
-            self._run.checkpoint(self._arrays(), {"steps": steps}, self._curve)
-        self._fresh = True
-        seed_update(self._run.config.seed, update)
-        self._env.reseed(self._run.config.seed, update)
-
-    def _on_rollout_start(self) -> None:
-        self.between_updates()
+    def keep(self, update: int, steps: int) -> None:
+        """As `Boundary.keep`."""
+        due = update % self._run.config.ppo.evaluate_every == 0
+        if due or steps >= self._run.config.steps:
+            self._evaluate(steps)
+        self._run.checkpoint(self.arrays(), {"steps": steps}, self.curve)
 
     def _on_step(self) -> bool:
-        best = max((one.f1 for one in self._curve), default=0.0)
-        now = self._curve[-1].f1 if self._curve else 0.0
+        best = max((one.f1 for one in self.curve), default=0.0)
+        now = self.curve[-1].f1 if self.curve else 0.0
         remark = f"F1 {now:.3f}, best {best:.3f}"
         self._tell(self.model.num_timesteps, self._run.config.steps, remark)
         return True
@@ -157,21 +132,15 @@ class _Boundary(BaseCallback):
         with torch_threads(1):
             metrics = player.play(self._run.song.score).metrics()
         made = Evaluation(steps, metrics["precision"], metrics["recall"], metrics["f1"])
-        if made.f1 > max((one.f1 for one in self._curve), default=-1.0):
+        if made.f1 > max((one.f1 for one in self.curve), default=-1.0):
             self._run.keep_best(weights, made)
-        self._curve.append(made)
+        self.curve.append(made)
         for name in ("precision", "recall", "f1"):
             self.logger.record(f"song/{name}", metrics[name])
         if steps:
             buffer = self.model.rollout_buffer  # type: ignore[attr-defined]
             self.logger.record("song/reward", float(buffer.rewards.mean()))
         self.logger.dump(steps)
-
-    def _arrays(self) -> Arrays:
-        arrays = model_arrays(self.model)
-        for name, array in self._env.batch.state().items():
-            arrays[f"env/{name}"] = array
-        return arrays
 
 
 def _actor_arrays(model: Any) -> Arrays:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,8 +12,10 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 
 from pianomime.errors import InputError
+from pianomime.learn.shared_vec_env import SharedVecEnv
 from pianomime.learn.tensors import Arrays
 
 
@@ -53,6 +56,58 @@ def torch_threads(threads: int) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
+
+
+class Boundary(BaseCallback):
+    """What happens between updates: something is kept, and the next begins the same each time.
+
+    Args:
+        env: where it learns.
+        seed: of all that is drawn.
+        steps_per_update: in all environments together.
+    """
+
+    def __init__(self, env: SharedVecEnv, seed: int, steps_per_update: int) -> None:
+        super().__init__()
+        self._env, self._seed, self._steps_per_update = env, seed, steps_per_update
+        self._fresh = True
+
+    @abstractmethod
+    def keep(self, update: int, steps: int) -> None:
+        """Keep what was learned in this many updates and steps."""
+
+    def arrays(self) -> Arrays:
+        """Everything that is needed to go on."""
+        arrays = model_arrays(self.model)
+        return arrays | {f"env/{name}": array for name, array in self._env.state().items()}
+
+    def resume(self, arrays: Arrays, steps: int, path: Path) -> None:
+        """Put model and environments where a checkpoint has them.
+
+        Raises:
+            InputError: it is that of another model.
+        """
+        self.model.num_timesteps = steps
+        self._env.resume(resume_model(self.model, arrays, path))
+        self._fresh = False
+
+    def between_updates(self) -> None:
+        """Keep what was learned, and begin the next update."""
+        steps = self.model.num_timesteps
+        update = steps // self._steps_per_update
+        # A checkpoint that was just read needs not be written again.
+        if self._fresh:
+            self._env.set_state(self._env.state())
+            self.keep(update, steps)
+        self._fresh = True
+        seed_update(self._seed, update)
+        self._env.reseed(self._seed, update)
+
+    def _on_rollout_start(self) -> None:
+        self.between_updates()
+
+    def _on_step(self) -> bool:
+        return True
 
 
 def model_arrays(model: Any) -> Arrays:

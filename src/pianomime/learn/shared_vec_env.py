@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from pianomime.learn.tensors import Arrays
+
 
 class SharedVecEnv(VecEnv):
     """Environments that are stepped as one: what ends begins again in the same step.
@@ -28,29 +30,49 @@ class SharedVecEnv(VecEnv):
     ) -> None:
         self.render_mode = None
         self.draw = np.random.default_rng(0)
+        self._resumed = False
         self._actions = np.zeros((count, *actions.shape), np.float32)
         super().__init__(count, observations, actions)
 
     @abstractmethod
-    def begin(self) -> NDArray[np.float32]:
-        """Begin an episode in every environment; the observations."""
+    def begin(self) -> None:
+        """Begin an episode in every environment."""
+
+    @abstractmethod
+    def look(self) -> NDArray[np.float32]:
+        """The observations of the present moment."""
 
     @abstractmethod
     def play(self, actions: NDArray[Any]) -> VecEnvStepReturn:
         """Play one frame in every environment."""
+
+    @abstractmethod
+    def state(self) -> Arrays:
+        """The present moment of all environments, for `set_state`."""
+
+    @abstractmethod
+    def set_state(self, state: Arrays) -> None:
+        """Go to a moment that `state` gave; what follows is the same each time."""
+
+    def resume(self, state: Arrays) -> None:
+        """As `set_state`; the next `reset` leaves it as it is."""
+        self.set_state(state)
+        self._resumed = True
 
     def reseed(self, *seed: int) -> None:
         """What is drawn from now on depends on nothing but this."""
         self.draw = np.random.default_rng(seed)
 
     def reset(self) -> NDArray[np.float32]:
-        """Begin an episode in every environment."""
+        """Begin an episode in every environment, or go on where `resume` put them."""
         if self._seeds[0] is not None:
             self.reseed(self._seeds[0])
-        observations = self.begin()
+        if not self._resumed:
+            self.begin()
+        self._resumed = False
         self._reset_seeds()
         self._reset_options()
-        return observations
+        return self.look()
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Take the actions for `step_wait`."""

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 from pianomime.learn.shared_vec_env import SharedVecEnv
 from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_env import action_space, observation_space
+from pianomime.learn.tensors import Arrays
 
 
 class SongVecEnv(SharedVecEnv):
@@ -25,20 +26,23 @@ class SongVecEnv(SharedVecEnv):
 
     def __init__(self, batch: SongBatch) -> None:
         self.batch = batch
-        self._resumed = False
         super().__init__(len(batch), observation_space(batch), action_space(batch))
 
-    def resume(self, state: dict[str, NDArray[Any]]) -> None:
-        """Go on from a moment; the next `reset` leaves it as it is."""
-        self.batch.set_state(state)
-        self._resumed = True
-
-    def begin(self) -> NDArray[np.float32]:
+    def begin(self) -> None:
         """Begin an episode in every environment."""
-        if not self._resumed:
-            self.batch.reset(self.draw)
-        self._resumed = False
+        self.batch.reset(self.draw)
+
+    def look(self) -> NDArray[np.float32]:
+        """The observations of the present moment."""
         return self.batch.observations.copy()
+
+    def state(self) -> Arrays:
+        """The present moment of all environments, for `set_state`."""
+        return self.batch.state()
+
+    def set_state(self, state: Arrays) -> None:
+        """Go to a moment that `state` gave; what follows is the same each time."""
+        self.batch.set_state(state)
 
     def play(self, actions: NDArray[Any]) -> VecEnvStepReturn:
         """Play one frame in every environment."""
@@ -55,7 +59,7 @@ class SongVecEnv(SharedVecEnv):
             }
         if len(ended):
             self.batch.reset(self.draw, ended)
-        return self.batch.observations.copy(), step.reward.astype(np.float32), done, infos
+        return self.look(), step.reward.astype(np.float32), done, infos
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """An attribute of the batch, which all environments share."""

@@ -76,7 +76,6 @@ class SongsVecEnv(SharedVecEnv):
         self._songs, self._agents = songs, agents
         self.worlds = WorldBatch(worlds, threads, quiet=True)
         self.rows = np.zeros((worlds, 2), np.int64)
-        self._resumed = False
         super().__init__(
             worlds * agents,
             gymnasium.spaces.Box(-np.inf, np.inf, (observations,), np.float32),
@@ -84,7 +83,7 @@ class SongsVecEnv(SharedVecEnv):
         )
 
     @abstractmethod
-    def look(self) -> NDArray[np.float32]:
+    def see(self) -> NDArray[np.float32]:
         """(W, agents, observations) of the present moment."""
 
     @abstractmethod
@@ -95,12 +94,13 @@ class SongsVecEnv(SharedVecEnv):
     def rewards(self, played: Played, said: NDArray[Any]) -> NDArray[np.float64]:
         """(W, agents) of a frame that was played; worlds whose song is over are at rest already."""
 
-    def begin(self) -> NDArray[np.float32]:
-        """Begin a song in every world, or go on where `resume` put them."""
-        if not self._resumed:
-            self._begin(np.arange(len(self.worlds)))
-        self._resumed = False
-        return self.look().reshape(self.num_envs, -1)
+    def begin(self) -> None:
+        """Begin a song in every world."""
+        self._begin(np.arange(len(self.worlds)))
+
+    def look(self) -> NDArray[np.float32]:
+        """The observations of the present moment."""
+        return self.see().reshape(self.num_envs, -1)
 
     def play(self, actions: NDArray[Any]) -> VecEnvStepReturn:
         """Play one frame in every world."""
@@ -118,7 +118,7 @@ class SongsVecEnv(SharedVecEnv):
         self.rows[:, 1] += 1
         over = self.rows[:, 1] == [len(song.goal) for song in songs]
         self._begin(np.flatnonzero(over))
-        told = self.look().reshape(self.num_envs, -1)
+        told = self.look()
         reward = np.where(over[:, None], 0.0, self.rewards(played, said))
         done = np.repeat(over, self._agents)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -137,11 +137,6 @@ class SongsVecEnv(SharedVecEnv):
         self.worlds.pedal[:] = state["pedal"]
         self.rows = state["rows"].copy()
         self.look()
-
-    def resume(self, state: Arrays) -> None:
-        """As `set_state`; the next `reset` leaves it as it is."""
-        self.set_state(state)
-        self._resumed = True
 
     def _begin(self, which: NDArray[np.int64]) -> None:
         if len(which):

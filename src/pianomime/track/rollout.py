@@ -16,7 +16,7 @@ from pianomime.plan import FingertipPlan
 from pianomime.track.tracker import Tracker
 from pianomime.world import World, WorldBatch
 from pianomime.world.figures import FINGER_ACTUATORS, key_centres
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import SIDES, Hand, by_actuator
 
 # Actuators of a hand: wrist and forearm.
 _ARM = [0, 1, 20, 21, 22]
@@ -91,7 +91,8 @@ class RolloutTracker:
         self._threads = threads
         self._tracker = tracker
         self._hands = [Hand(side) for side in SIDES]
-        self._spread = self._spreads()
+        size = self.config
+        self._spread = by_actuator(size.joint, size.wrist, size.slide)
 
     def begin(self, plan: FingertipPlan) -> None:
         """Prepare the tracker; draw the same variations for the same plan."""
@@ -179,13 +180,3 @@ class RolloutTracker:
         share = ((at % self.config.knots) / self.config.knots)[:, None]
         smooth: NDArray[np.float64] = drawn[:, low] * (1 - share) + drawn[:, low + 1] * share
         return smooth
-
-    def _spreads(self) -> NDArray[np.float64]:
-        """(46,) standard deviation of each actuator's variation."""
-        spread = np.empty(46)
-        for hand in self._hands:
-            one = np.full(23, self.config.joint)
-            one[:2] = self.config.wrist
-            one[20:] = self.config.slide
-            spread[hand.actuators] = one
-        return spread

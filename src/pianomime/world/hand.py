@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 from pianomime.world.figures import (
     HAND_ACTUATORS,
     HAND_JOINTS,
+    KEYS,
     LEFT_JOINTS,
     RIGHT_JOINTS,
 )
@@ -75,3 +78,27 @@ class Hand:
             self.data.moment_colind.reshape(-1),
         )
         return moment
+
+
+@cache
+def both_hands() -> tuple[Hand, Hand]:
+    """Left and right, to be looked at: they are everybody's, and stay in no pose."""
+    left, right = SIDES
+    return Hand(left), Hand(right)
+
+
+def hand_points(joints: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(B, 2, 6, 3) [m] points of both hands, left first, at joints (B, 54), right then left."""
+    points = np.empty((len(joints), 2, 6, 3))
+    for index, hand in enumerate(both_hands()):
+        first = hand.joints.start - KEYS
+        for row, pose in enumerate(joints[:, first : first + HAND_JOINTS]):
+            points[row, index] = hand.points(pose)
+    return points
+
+
+def by_actuator(finger: float, wrist: float, slide: float) -> NDArray[np.float64]:
+    """(46,) a figure for the actuators of fingers, one for wrists and one for forearms' slides."""
+    one = np.full(HAND_ACTUATORS, finger)
+    one[:2], one[20:] = wrist, slide
+    return np.tile(one, 2)

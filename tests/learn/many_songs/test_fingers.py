@@ -49,7 +49,7 @@ def test_who_adds_nothing_plays_as_the_dynamic_tracker_does(two_notes):
 
 def test_left_fingers_are_told_what_right_ones_are_in_a_mirror(two_notes):
     """Of a plan and a world that are their own mirror images: about a D, also keys are."""
-    plan = PlannedSong.of(two_notes.score).plan
+    plan = PlannedSong.of(two_notes.score).demonstration.plan
     low, high, centre = 31, 51, key_centres()[41, 1]
     mirrored = [0, 2 * centre, 0]
     tips = plan.fingertips.copy()

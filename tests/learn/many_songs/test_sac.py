@@ -9,7 +9,7 @@ from pianomime import Player
 from pianomime.errors import InputError
 from pianomime.generalist.methods import WEIGHTS
 from pianomime.learn.sac.config import SacConfig
-from pianomime.learn.sac.training import AskedSong, SacVecEnv, steps, train_sac
+from pianomime.learn.sac.training import STEPS, AskedSong, SacVecEnv, train_sac
 
 SMALL = SacConfig(frames=200, worlds=2, updates=1, batch=8, buffer=400, hidden=(16,), seconds=2.0)
 
@@ -30,7 +30,7 @@ def test_an_action_moves_an_actuator_by_its_step(two_notes):
     held = env.controls(said)
     said[:, 0, 7] = 1.0
     moved = env.controls(said) - held
-    np.testing.assert_allclose(moved[:, 7], steps()[7])
+    np.testing.assert_allclose(moved[:, 7], STEPS[7])
     np.testing.assert_allclose(np.delete(moved, 7, axis=1), 0.0)
 
 

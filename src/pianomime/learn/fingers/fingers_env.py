@@ -12,11 +12,12 @@ from pianomime.generalist.fingers import ACTIONS, SIZE, Surroundings, controls
 from pianomime.learn.fingers.config import FingersConfig
 from pianomime.learn.songs_vec_env import Played, SongsVecEnv
 from pianomime.music import Score
-from pianomime.plan import FingertipPlan, ZeroShotPlanner
+from pianomime.plan import ZeroShotPlanner
 from pianomime.track import DynamicTracker
+from pianomime.video.demonstration import Demonstration
 from pianomime.world.figures import key_centres
 
-FINGERS = 10
+AGENTS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,14 +25,14 @@ class PlannedSong:
     """A song, ready to be played.
 
     Attributes:
-        plan: its plan.
+        demonstration: it, with its plan.
         goal: (T, 88) bool, what it wants.
         pedal: (T,) bool.
         tracker: that follows the plan.
         surroundings: what fingers are told of it.
     """
 
-    plan: FingertipPlan
+    demonstration: Demonstration
     goal: NDArray[np.bool_]
     pedal: NDArray[np.bool_]
     tracker: DynamicTracker
@@ -42,7 +43,13 @@ class PlannedSong:
         """As the zero-shot planner plans it."""
         plan, tracker = ZeroShotPlanner().plan(score), DynamicTracker()
         tracker.begin(plan)
-        return cls(plan, score.roll(), score.pedal_roll(), tracker, Surroundings(plan, tracker))
+        return cls(
+            Demonstration(score, plan),
+            score.roll(),
+            score.pedal_roll(),
+            tracker,
+            Surroundings(plan, tracker),
+        )
 
 
 class FingersVecEnv(SongsVecEnv):
@@ -61,19 +68,19 @@ class FingersVecEnv(SongsVecEnv):
     def __init__(self, songs: list[PlannedSong], config: FingersConfig, threads: int = 0) -> None:
         self._planned, self._config = songs, config
         self._proposed = np.zeros((config.worlds, 46))
-        self._tips = np.zeros((config.worlds, FINGERS, 3))
-        self._told = np.zeros((config.worlds, FINGERS, SIZE), np.float32)
-        super().__init__(songs, config.worlds, FINGERS, SIZE, ACTIONS, threads)
+        self._tips = np.zeros((config.worlds, AGENTS, 3))
+        self._told = np.zeros((config.worlds, AGENTS, SIZE), np.float32)
+        super().__init__(songs, config.worlds, AGENTS, SIZE, ACTIONS, threads)
 
-    def look(self) -> NDArray[np.float32]:
-        """As `SongsVecEnv.look`; and ask the tracker."""
+    def see(self) -> NDArray[np.float32]:
+        """As `SongsVecEnv.see`; and ask the tracker."""
         qpos, velocities = self.worlds.qpos, self.worlds.qvel_hands
         keys = self.worlds.key_state
         for row, (number, frame) in enumerate(self.rows.tolist()):
             song = self._planned[number]
             proposed, points = song.tracker.controls(np.array([frame]), qpos[row : row + 1])
             self._proposed[row] = proposed[0]
-            self._tips[row] = points[0, :, 1:].reshape(FINGERS, 3)
+            self._tips[row] = points[0, :, 1:].reshape(AGENTS, 3)
             self._told[row] = song.surroundings.look(
                 frame, qpos[row], velocities[row], keys[row], points[0]
             )
@@ -86,7 +93,9 @@ class FingersVecEnv(SongsVecEnv):
 
     def rewards(self, played: Played, said: NDArray[Any]) -> NDArray[np.float64]:
         """As `SongsVecEnv.rewards`."""
-        keys = np.array([self._planned[number].plan.finger_key[at] for number, at in played.rows])
+        keys = np.array(
+            [self._planned[number].demonstration.plan.finger_key[at] for number, at in played.rows]
+        )
         reward = finger_rewards(
             played.pressed, played.key_state, played.wanted, keys, self._tips, self._config.wrong
         )
@@ -112,7 +121,7 @@ def finger_rewards(
         tips: (B, 10, 3) where fingertips are [m].
         wrong: what a key costs that nobody wants.
     """
-    own = finger_key.reshape(len(pressed), FINGERS).astype(np.int64)
+    own = finger_key.reshape(len(pressed), AGENTS).astype(np.int64)
     at = np.maximum(own, 0)
     down = np.take_along_axis(pressed, at, axis=1) + 0.2 * np.take_along_axis(key_state, at, axis=1)
     reward: NDArray[np.float64] = np.where(own >= 0, down / 1.2, 0.0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -11,34 +9,26 @@ from typing import Any
 
 import numpy as np
 import torch
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
 from pianomime.errors import InputError
 from pianomime.generalist.fingers import SIZE, FingerTracker
+from pianomime.generalist.methods import FINGERS
 from pianomime.learn.config_check import within
 from pianomime.learn.fingers.config import FingersConfig, check_fingers
-from pianomime.learn.fingers.fingers_env import FINGERS, FingersVecEnv, PlannedSong
+from pianomime.learn.fingers.fingers_env import AGENTS, FingersVecEnv, PlannedSong
 from pianomime.learn.fit_folder import FitFolder
 from pianomime.learn.generalist.export import export_network
-from pianomime.learn.ppo_model import (
-    Ppo,
-    actor_network,
-    model_arrays,
-    resume_model,
-    seed_update,
-    torch_threads,
-)
-from pianomime.learn.run_lock import run_lock
+from pianomime.learn.ppo_model import Boundary, Ppo, actor_network, torch_threads
 from pianomime.learn.run_log import RunLog
 from pianomime.learn.song import load_score
+from pianomime.learn.stage_folder import stage_folder
 from pianomime.learn.tell import Tell
-from pianomime.music import frame_metrics
+from pianomime.play import Player
 from pianomime.song_files import find_songs
 from pianomime.track import DynamicTracker, Tracker
-from pianomime.world import World
+from pianomime.video.demonstration import Demonstration, DemonstrationPlanner
 
-STAGE = "fingers"
 _MEASURED = 8
 """Songs that are kept from training, by which it is seen how well it goes."""
 _CHECKPOINT = 20
@@ -73,15 +63,7 @@ def train_fingers(
     check_fingers(config)
     paths = find_songs(folders)
     within("number of songs", len(paths), _MEASURED + 1)
-    digest = hashlib.sha256()
-    for path in paths:
-        digest.update(path.read_bytes())
-    about = {"stage": STAGE, **dataclasses.asdict(config), "data": digest.hexdigest()[:16]}
-    path = out / STAGE
-    path.mkdir(parents=True, exist_ok=True)
-    result = out / f"{STAGE}.onnx"
-    with run_lock(path):
-        folder = FitFolder.open(path, about)
+    with stage_folder(out, FINGERS, config, paths) as (folder, result):
         if folder.finished and result.exists():
             return result, folder.weights()[1]
         songs = []
@@ -100,14 +82,14 @@ def train_fingers(
             model.set_logger(Logger(None, []))
             state = folder.state()
             if state is not None:
-                boundary.resume(*state)
+                boundary.resume(*state, folder.path)
             model.learn(
-                config.frames * FINGERS - model.num_timesteps,
+                config.frames * AGENTS - model.num_timesteps,
                 callback=boundary,
                 reset_num_timesteps=state is None,
             )
         network = actor_network(model).eval()
-        told = {"stage": STAGE, "level": "fingers"}
+        told = {"stage": FINGERS, "level": "fingers"}
         export_network(network, (torch.zeros(2, SIZE),), ["told"], ["said"], told, result)
         measured = _measure([songs[number] for number in held], network)
         weights = {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}
@@ -139,8 +121,8 @@ def _model(env: FingersVecEnv, config: FingersConfig) -> Ppo:
     )
 
 
-class _Boundary(BaseCallback):
-    """What happens between updates: tell, write a checkpoint, seed anew."""
+class _Boundary(Boundary):
+    """Tells, and writes a checkpoint every now and then."""
 
     def __init__(
         self,
@@ -150,39 +132,21 @@ class _Boundary(BaseCallback):
         log: RunLog,
         tell: Tell | None,
     ) -> None:
-        super().__init__()
-        self._folder, self._env, self._config = folder, env, config
+        super().__init__(env, config.seed, config.frames_per_update * AGENTS)
+        self._folder, self._config = folder, config
         self._log, self._tell = log, tell
-        self._fresh = True
 
-    def resume(self, arrays: dict[str, Any], steps: int) -> None:
-        """Put model and worlds where a checkpoint has them."""
-        self.model.num_timesteps = steps
-        self._env.resume(resume_model(self.model, arrays, self._folder.path))
-        self._fresh = False
-
-    def _on_rollout_start(self) -> None:
-        steps = self.model.num_timesteps
-        update = steps // (self._config.frames_per_update * FINGERS)
-        if self._fresh:
-            self._env.set_state(self._env.state())
-            if update % _CHECKPOINT == 0 and update:
-                arrays = model_arrays(self.model)
-                arrays |= {f"env/{name}": array for name, array in self._env.state().items()}
-                self._folder.checkpoint(arrays, steps)
-        self._fresh = True
-        seed_update(self._config.seed, update)
-        self._env.reseed(self._config.seed, update)
-
-    def _on_step(self) -> bool:
-        return True
+    def keep(self, update: int, steps: int) -> None:
+        """As `Boundary.keep`."""
+        if update % _CHECKPOINT == 0 and update:
+            self._folder.checkpoint(self.arrays(), steps)
 
     def _on_rollout_end(self) -> None:
         buffer = self.model.rollout_buffer  # type: ignore[attr-defined]
         reward = float(buffer.rewards.mean())
         self._log.add(self.model.num_timesteps, {"fingers/reward": reward})
         if self._tell is not None:
-            done = self.model.num_timesteps // FINGERS
+            done = self.model.num_timesteps // AGENTS
             self._tell(done, self._config.frames, f"reward {reward:.4f}")
 
 
@@ -195,7 +159,7 @@ def _measure(songs: list[PlannedSong], network: torch.nn.Module) -> dict[str, fl
 
     with torch_threads(1):
         return {
-            name: float(np.mean([_f1(song, tracker) for song in songs]))
+            name: float(np.mean([_f1(song.demonstration, tracker) for song in songs]))
             for name, tracker in (
                 ("unseen/f1_without", DynamicTracker()),
                 ("unseen/f1", FingerTracker(run)),
@@ -203,11 +167,6 @@ def _measure(songs: list[PlannedSong], network: torch.nn.Module) -> dict[str, fl
         }
 
 
-def _f1(song: PlannedSong, tracker: Tracker) -> float:
-    world = World(quiet=True)
-    tracker.begin(song.plan)
-    pressed = np.empty_like(song.goal)
-    for frame in range(len(song.plan)):
-        world.step(tracker.control(frame, world), bool(song.pedal[frame]))
-        pressed[frame] = world.pressed
-    return frame_metrics(song.goal, pressed).f1
+def _f1(song: Demonstration, tracker: Tracker) -> float:
+    played = Player(FINGERS, DemonstrationPlanner(song), tracker).play(song.score)
+    return float(played.metrics()["f1"])

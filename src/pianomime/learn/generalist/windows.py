@@ -23,7 +23,7 @@ from pianomime.generalist.horizon import CHUNK, HIGH_GOALS
 from pianomime.learn.generalist.clips import Clips
 from pianomime.learn.generalist.config import StageConfig
 from pianomime.world.figures import HAND_JOINTS, KEYS
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import both_hands, hand_points
 
 _OCTAVE = 12
 _SLIDES = (0, HAND_JOINTS)
@@ -53,7 +53,7 @@ class Windows:
             tips = np.roll(clips.columns["fingertips"], 1, axis=0)
             tips[clips.starts] = rest_tips()
         else:
-            tips = _points(clips.columns["joints"])
+            tips = hand_points(clips.columns["joints"])
         return cls(clips, config, tips.astype(np.float32))
 
     def __len__(self) -> int:
@@ -155,7 +155,7 @@ class Windows:
 @cache
 def _slide_ends() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(2,) least and most of the controls that carry the forearms along [m]."""
-    hands = [Hand(side) for side in reversed(SIDES)]
+    hands = both_hands()[::-1]
     low, high = (
         np.array([getattr(hand, end)[_SLIDE_CONTROLS[0]] for hand in hands])
         for end in ("ctrl_low", "ctrl_high")
@@ -185,14 +185,3 @@ def _slid(
     for slide in slides:
         moved[..., slide] += off.reshape(-1, *[1] * (values.ndim - 2))
     return moved
-
-
-def _points(joints: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(T, 2, 6, 3) points of joints (T, 54)."""
-    points = np.empty((len(joints), 2, 6, 3))
-    for index, side in enumerate(SIDES):
-        hand = Hand(side)
-        first = 0 if side == "rh" else HAND_JOINTS
-        for frame, pose in enumerate(joints[:, first : first + HAND_JOINTS]):
-            points[frame, index] = hand.points(pose)
-    return points

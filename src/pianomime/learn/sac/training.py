@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -18,26 +16,25 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
-from pianomime.generalist.features import CONTROLS, TIPS, low_inputs
+from pianomime.generalist.features import CONTROLS, TIPS, holding, low_inputs
 from pianomime.generalist.horizon import CHUNK
-from pianomime.learn.fit_folder import FitFolder
 from pianomime.learn.generalist.export import export_network
 from pianomime.learn.generalist.scale import Scale
 from pianomime.learn.reward import press_reward
-from pianomime.learn.run_lock import run_lock
 from pianomime.learn.run_log import RunLog
 from pianomime.learn.sac.config import SacConfig, check_sac
 from pianomime.learn.song import load_score
 from pianomime.learn.songs_vec_env import Played, SongsVecEnv
+from pianomime.learn.stage_folder import stage_folder
 from pianomime.learn.tell import Tell
 from pianomime.music import Score
 from pianomime.song_files import find_songs
 from pianomime.world.figures import KEYS
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import by_actuator, hand_points
 
 STAGE = "multi-task-sac"
-_STEP, _SLIDE = 0.3, 0.06
-"""[rad], [m] that an action of 1 sends an actuator away from where it is, or a forearm."""
+STEPS = by_actuator(finger=0.3, wrist=0.3, slide=0.06)
+"""(46,) [rad, m] that an action of 1 sends an actuator away from where it is."""
 _SCALED_BY = 64
 """Frames, in all worlds, from which the scale of what is seen is taken."""
 _VECTOR = 108 + KEYS + TIPS
@@ -65,6 +62,9 @@ class AskedSong:
 class SacVecEnv(SongsVecEnv):
     """Both hands of a world are one agent, which sees what a policy of one stage sees.
 
+    Attributes:
+        scale: brings what is seen to a common size, once it is known.
+
     Args:
         songs: what is played.
         config: how.
@@ -73,27 +73,26 @@ class SacVecEnv(SongsVecEnv):
 
     def __init__(self, songs: Sequence[AskedSong], config: SacConfig, threads: int = 0) -> None:
         silence = np.zeros((CHUNK, KEYS), bool)
+        self.scale: Scale | None = None
         self._goals = [np.vstack([song.goal, silence]) for song in songs]
-        self._hands = [Hand(side) for side in SIDES]
         self._holding = np.zeros((config.worlds, CONTROLS))
         super().__init__(songs, config.worlds, 1, CHUNK * KEYS + _VECTOR, CONTROLS, threads)
 
-    def look(self) -> NDArray[np.float32]:
-        """As `SongsVecEnv.look`."""
-        qpos, joints = self.worlds.qpos, self.worlds.qpos_hands
-        tips = np.array([[hand.points(row[hand.joints]) for hand in self._hands] for row in qpos])
+    def see(self) -> NDArray[np.float32]:
+        """As `SongsVecEnv.see`."""
+        joints = self.worlds.qpos_hands
+        self._holding = holding(joints)
         goal = np.array([self._goals[song][at : at + CHUNK] for song, at in self.rows.tolist()])
-        keys = self.worlds.key_state
-        seen = low_inputs(goal, None, tips, joints, self.worlds.qvel_hands, keys, None)
-        for hand in self._hands:
-            here = qpos[:, hand.joints]
-            self._holding[:, hand.actuators] = here @ hand.to_ctrl.T
-        told = np.concatenate([seen["goal"].reshape(len(qpos), -1), seen["vector"]], axis=1)
+        keys, velocities = self.worlds.key_state, self.worlds.qvel_hands
+        seen = low_inputs(goal, None, hand_points(joints), joints, velocities, keys, None)
+        told = np.concatenate([seen["goal"].reshape(len(joints), -1), seen["vector"]], axis=1)
+        if self.scale is not None:
+            told = self.scale(torch.from_numpy(told)).numpy()
         return told[:, None]
 
     def controls(self, said: NDArray[Any]) -> NDArray[np.float64]:
         """As `SongsVecEnv.controls`."""
-        ctrl: NDArray[np.float64] = self._holding + steps() * said[:, 0]
+        ctrl: NDArray[np.float64] = self._holding + STEPS * said[:, 0]
         return ctrl
 
     def rewards(self, played: Played, said: NDArray[Any]) -> NDArray[np.float64]:
@@ -110,34 +109,13 @@ class _Actor(nn.Module):
     def __init__(self, scale: Scale, actor: Any) -> None:
         super().__init__()
         self.scale, self.body, self.mean = scale, actor.latent_pi, actor.mu
-        self.register_buffer("steps", torch.from_numpy(steps()).float())
+        self.register_buffer("steps", torch.from_numpy(STEPS).float())
 
     def forward(self, goal: Tensor, vector: Tensor) -> Tensor:
         """(B, 1, 46) what is added to the controls that hold the pose."""
         told = torch.cat([goal.flatten(1), vector], dim=1)
         said = torch.tanh(self.mean(self.body(self.scale(told))))
         return (self.steps * said)[:, None]
-
-
-class _Scaled(SacVecEnv):
-    """What is seen, brought to a common size."""
-
-    scale: Scale | None = None
-
-    def look(self) -> NDArray[np.float32]:
-        """As `SongsVecEnv.look`."""
-        told = super().look()
-        if self.scale is None:
-            return told
-        scaled: NDArray[np.float32] = self.scale(torch.from_numpy(told)).numpy()
-        return scaled
-
-
-def steps() -> NDArray[np.float64]:
-    """(46,) what an action of 1 adds [rad, m]."""
-    one = np.full(CONTROLS // 2, _STEP)
-    one[20:] = _SLIDE
-    return np.tile(one, 2)
 
 
 def train_sac(
@@ -164,22 +142,14 @@ def train_sac(
         OSError: a file cannot be read or written.
     """
     check_sac(config)
-    digest = hashlib.sha256()
-    scores = []
-    for path in find_songs(folders):
-        digest.update(path.read_bytes())
-        scores.append(load_score(path, 0.0, config.seconds))
-    about = {"stage": STAGE, **dataclasses.asdict(config), "data": digest.hexdigest()[:16]}
-    path = out / STAGE
-    path.mkdir(parents=True, exist_ok=True)
-    result = out / f"{STAGE}.onnx"
-    with run_lock(path):
-        folder = FitFolder.open(path, about)
+    paths = find_songs(folders)
+    with stage_folder(out, STAGE, config, paths) as (folder, result):
         if folder.finished and result.exists():
             return result
-        env = _Scaled([AskedSong.of(score) for score in scores], config, threads)
+        songs = [AskedSong.of(load_score(path, 0.0, config.seconds)) for path in paths]
+        env = SacVecEnv(songs, config, threads)
         env.reseed(config.seed)
-        env.scale = _scale(env, config.seed)
+        scale = env.scale = _scale(env, config.seed)
         model = SAC(
             "MlpPolicy",
             env,
@@ -196,7 +166,7 @@ def train_sac(
         model.set_logger(Logger(None, []))
         with closing(RunLog(folder.tensorboard, 1)) as log:
             model.learn(config.frames, callback=_Told(config, log, tell))
-        actor = _Actor(env.scale, model.policy.actor).eval()
+        actor = _Actor(scale, model.policy.actor).eval()
         about = {
             "stage": STAGE,
             "level": "whole",
@@ -237,10 +207,7 @@ def _scale(env: SacVecEnv, seed: int) -> Scale:
     draw = np.random.default_rng(seed)
     env.reset()
     shape = (env.num_envs, CONTROLS)
-    seen = []
-    for _ in range(_SCALED_BY):
-        env.play(draw.uniform(-1, 1, shape))
-        seen.append(env.look()[:, 0])
+    seen = [np.asarray(env.play(draw.uniform(-1, 1, shape))[0]) for _ in range(_SCALED_BY)]
     scale = Scale(CHUNK * KEYS + _VECTOR)
     scale.fit(np.concatenate(seen))
     # Keys that nobody happened to want are not unlike others.
