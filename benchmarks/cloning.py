@@ -20,19 +20,18 @@ import common
 from pianomime.generalist.methods import load_follower
 from pianomime.generalist.sampler import Sampler
 from pianomime.generalist.snap import flat_heights
-from pianomime.learn.generalist.clips import HumanClip, held_out, read_human
+from pianomime.learn.generalist.clips import held_out, read_human
 from pianomime.plan.hand_path import settled
 from pianomime.play import Player
 from pianomime.track import DynamicTracker, IkTracker, Tracker
-from pianomime.video.demonstration import DemonstrationPlanner
+from pianomime.video.demonstration import Demonstration, DemonstrationPlanner
 
 _AS_THEY_WERE = "as they were"
 
 
-def score(clip: HumanClip, follower: str) -> dict[str, float]:
+def score(demonstration: Demonstration, follower: str) -> dict[str, float]:
     """The metrics of one clip."""
     name, _, kind = follower.partition(", ")
-    demonstration = clip.demonstration
     if kind != _AS_THEY_WERE:
         plan = settled(demonstration.plan)
         if name != "dynamic":

@@ -3,16 +3,17 @@
     PIANOMIME_WEIGHTS=out/generalist python benchmarks/paper_tables.py -o out/tables
     python benchmarks/paper_tables.py --weights out/one out/two out/three --headline two-stage-diff
 
-Plays all songs of both sets with every method whose weights are there, thrice with other draws,
-and the headline method with the weights of each training as well. OUT then holds songs.csv (a row
-for each playing), tables.md (the main comparison, and tables 9 and 10) and methods.png. What was
-played before, by the same program and weights, is not played again.
+Plays all songs of both sets with every method whose weights are there, thrice with other draws, and
+the headline method so with the weights of each training. OUT then holds songs.csv (a row for each
+playing), tables.md (the main comparison, and tables 9 and 10) and methods.png. What was played
+before, by the same program and weights, is not played again.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import itertools
 import os
 import statistics
 from pathlib import Path
@@ -80,7 +81,7 @@ def play(
         {
             "method": method,
             "effort": effort,
-            "weights": "" if weights is None else weights.name,
+            "weights": "" if weights is None else str(weights),
             "seed": seed,
             "set": songs,
             "song": song["song"],
@@ -90,37 +91,58 @@ def play(
     ]
 
 
+def there(method: str) -> bool:
+    """Whether the weights of a method are; if not, says so."""
+    try:
+        weight_files(method)
+    except InputError as error:
+        print(f"left out: {method} ({error})")
+        return False
+    return True
+
+
 def some(rows: list[Row], **wanted: Any) -> list[Row]:
     """The rows that have these values."""
     return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
 
 
-def means(rows: list[Row], figure: str) -> list[float]:
-    """Over the songs of a set, of each playing."""
-    playings: dict[tuple[str, int], list[float]] = {}
+def means(rows: list[Row], figure: str) -> list[list[float]]:
+    """Over the songs of a set: of each training, of each draw."""
+    trainings: dict[str, dict[int, list[float]]] = {}
     for row in rows:
-        playings.setdefault((row["weights"], row["seed"]), []).append(row[figure])
-    return [statistics.mean(values) for values in playings.values()]
+        draws = trainings.setdefault(row["weights"], {})
+        draws.setdefault(row["seed"], []).append(row[figure])
+    return [[statistics.mean(songs) for songs in draws.values()] for draws in trainings.values()]
 
 
-def spread(values: list[float]) -> str:
-    """Mean and standard deviation."""
-    deviation = statistics.stdev(values) if len(values) > 1 else 0.0
-    return f"{statistics.mean(values):.3f} ± {deviation:.3f}"
+def overall(trainings: list[list[float]]) -> float:
+    """The mean; each training counts alike."""
+    return statistics.mean(map(statistics.mean, trainings))
+
+
+def spread(trainings: list[list[float]]) -> str:
+    """Mean, and standard deviations of draws and of trainings, where there are several."""
+    text = f"{overall(trainings):.3f}"
+    if len(trainings[0]) > 1:
+        text += f" ± {statistics.mean(map(statistics.stdev, trainings)):.3f}"
+    if len(trainings) > 1:
+        text += f" ± {statistics.stdev(map(statistics.mean, trainings)):.3f}"
+    return text
 
 
 def comparison(rows: list[Row], players: list[tuple[str, int]]) -> str:
     """The main table."""
     lines = [
-        "| player | set | playings | precision | recall | F1 | the paper's P / R / F1 |",
-        "| --- | --- | ---: | ---: | ---: | ---: | --- |",
+        "| player | set | trainings x draws | precision | recall | F1 | the paper's P / R / F1 |",
+        "| --- | --- | --- | ---: | ---: | ---: | --- |",
     ]
     for method, effort in players:
         for songs in SETS:
             mine = some(rows, method=method, effort=effort, set=songs)
             cells = [spread(means(mine, figure)) for figure in FIGURES]
             theirs = " / ".join(f"{value:.2f}" for value in PAPER.get(method, {}).get(songs, ()))
-            count = len(means(mine, "f1"))
+            trainings = means(mine, "f1")
+            count = f"{len(trainings)} x {len(trainings[0])}"
             name = f"{method}, effort {effort}"
             lines.append(f"| {name} | {songs} | {count} | {' | '.join(cells)} | {theirs} |")
     return "\n".join(lines)
@@ -157,7 +179,7 @@ def picture(rows: list[Row], players: list[tuple[str, int]], path: Path) -> None
     for axis, songs in zip(axes, SETS, strict=True):
         for at, (method, effort) in enumerate(players):
             mine = some(rows, method=method, effort=effort, set=songs)
-            ours = statistics.mean(means(mine, "f1"))
+            ours = overall(means(mine, "f1"))
             axis.barh(at - 0.2, ours, 0.4, color="tab:blue", label="ours" if not at else None)
             axis.text(ours + 0.01, at - 0.2, f"{ours:.2f}", va="center", fontsize=8)
             theirs = PAPER.get(method, {}).get(songs)
@@ -189,27 +211,25 @@ def main() -> None:
     facts = common.machine()
     common.show_machine(facts)
     first, *others = arguments.weights or [None]
+    for weights in others:
+        os.environ[WEIGHTS] = str(weights)
+        try:
+            weight_files(arguments.headline)
+        except InputError as error:
+            raise SystemExit(str(error)) from None
     if first is not None:
         os.environ[WEIGHTS] = str(first)
-    players: list[tuple[str, int]] = []
-    for method in METHODS:
-        try:
-            weight_files(method)
-        except InputError as error:
-            print(f"left out: {method} ({error})")
-        else:
-            players.append((method, arguments.effort))
-    players += [(name, effort) for effort in arguments.efforts for name in ("zero-shot", FINGERS)]
+    methods = [name for name in (*METHODS, FINGERS) if there(name)]
+    players = [(method, arguments.effort) for method in methods if method in METHODS]
+    ours = ["zero-shot", *(name for name in methods if name == FINGERS)]
+    players += [(name, effort) for effort in arguments.efforts for name in ours]
     rows = []
     for method, effort in players:
         drawn = METHODS.get(method, ("",))[0] not in ("bc-mse", "multi-task-sac")
         seeds = arguments.seeds if drawn and method in METHODS else (0,)
-        for songs in SETS:
-            for seed in seeds:
-                rows += play(method, first, seed, effort, songs, arguments)
-            if method == arguments.headline:
-                for weights in others:
-                    rows += play(method, weights, seeds[0], effort, songs, arguments)
+        trainings = [first, *(others if method == arguments.headline else ())]
+        for songs, weights, seed in itertools.product(SETS, trainings, seeds):
+            rows += play(method, weights, seed, effort, songs, arguments)
     arguments.output.mkdir(parents=True, exist_ok=True)
     with (
         atomic(arguments.output / "songs.csv") as temporary,

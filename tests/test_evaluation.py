@@ -13,7 +13,9 @@ from pathlib import Path
 import pytest
 
 from pianomime import evaluate, songs
+from pianomime.errors import InputError
 from pianomime.evaluation import markdown
+from pianomime.generalist.methods import WEIGHTS
 from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
 
@@ -63,6 +65,18 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     assert len(causes) == 2 + sum(len(shares) for shares in results["causes"].values())
     # Every line has as many cells as the first, the bar in the broken one's name escaped.
     assert len({line.replace("\\|", "").count("|") for line in table}) == 1
+
+
+def test_weights_that_cannot_be_read_are_told_once(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fingers.onnx").write_bytes(b"no network")
+    monkeypatch.setenv(WEIGHTS, str(tmp_path))
+    with pytest.raises(InputError, match=r"damaged|onnxruntime"):
+        evaluate([folder], "fingers", out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match="seed"):
+        evaluate([folder], seed=-1)
 
 
 def test_finished_songs_are_not_played_again(folder: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
@@ -11,14 +12,14 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import closing
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.generalist.methods import weight_files
-from pianomime.play import EFFORT, SECONDS, check_player
+from pianomime.play import EFFORT, SECONDS, Player, check_player
 from pianomime.song_files import find_songs
 from pianomime.song_worker import SongWorker
 
@@ -27,7 +28,7 @@ Row = dict[str, Any]
 `pianomime.explain.frames_by_cause`, if the player plans), or `song` and `error`."""
 
 # Those that decide how a song is played.
-_LIBRARIES = ("daqp", "mujoco", "numpy", "scipy", "symusic")
+_LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy", "symusic")
 
 Progress = Callable[[int, int, float], None]
 """Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
@@ -68,7 +69,8 @@ def evaluate(
         costliest first).
 
     Raises:
-        InputError: a path stands for no song, or there is no such player.
+        InputError: a path stands for no song, or there is no such player, or its weights cannot be
+            read.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
@@ -77,7 +79,12 @@ def evaluate(
         raise InputError(f"seconds must be more than 0, not {seconds:g}")
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
-    setting = f"{player} {effort} {seconds:g} {seed} {_digest(weight_files(player))}"
+    if seed < 0:
+        raise InputError(f"seed must be 0 or more, not {seed}")
+    weights = weight_files(player)
+    if weights:  # Whether they can be read is told here, once.
+        Player.from_name(player, effort, seed)
+    setting = f"{player} {effort} {seconds:g} {seed} {_digest(weights)}"
     store = None if out is None else _Store(Path(out), setting)
 
     rows: dict[Path, Row] = {}
@@ -226,7 +233,8 @@ def _program_hash() -> str:
     """Changes with our code, its figures and its libraries, so that no older result is reused."""
     digest = hashlib.sha256()
     for library in _LIBRARIES:
-        digest.update(f"{library} {version(library)} ".encode())
+        with contextlib.suppress(PackageNotFoundError):  # Not all are in every installation.
+            digest.update(f"{library} {version(library)} ".encode())
     files = sorted(Path(__file__).parent.rglob("*"))
     digest.update(_digest(file for file in files if file.suffix in (".py", ".json")).encode())
     return digest.hexdigest()

@@ -101,7 +101,8 @@ class Player:
         Args:
             name: one of `PLAYERS`.
             effort: 0 plays straight away; 1 to 3 try variations of what goes wrong before it
-                is played, ever more of them. Players that do not search are always the same.
+                is played, ever more of them. Players that imitate run a diffusion in ever more
+                steps. All others are always the same.
             seed: of what it draws.
 
         Raises:

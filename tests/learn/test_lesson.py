@@ -9,7 +9,6 @@ from pianomime import cli
 from pianomime.errors import InputError
 from pianomime.generalist.methods import weights_folder
 from pianomime.learn.expert_data import ExpertData
-from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson import hold_lesson, hold_lessons
 from pianomime.learn.lesson_config import LessonConfig
 from pianomime.plan.hand_path import settled
@@ -20,7 +19,7 @@ QUIET = LessonConfig(noise=0.0)
 
 
 def test_without_noise_the_teacher_plays(two_notes):
-    episode = hold_lesson(HumanClip(two_notes, 7), 0, QUIET)
+    episode = hold_lesson(replace(two_notes, song=7), 0, QUIET)
     tracker, world = DynamicTracker(), World()
     tracker.begin(settled(two_notes.plan))
     for frame in range(len(two_notes.plan)):
@@ -34,8 +33,7 @@ def test_without_noise_the_teacher_plays(two_notes):
 
 def test_with_noise_the_teacher_says_how_to_come_back(two_notes):
     """What is written down is what it would do, not what was done."""
-    clip = HumanClip(two_notes, 0)
-    one, other = (hold_lesson(clip, 0, replace(QUIET, noise=noise)) for noise in (0.05, 0.3))
+    one, other = (hold_lesson(two_notes, 0, replace(QUIET, noise=noise)) for noise in (0.05, 0.3))
     assert np.abs(one.columns["joints"] - other.columns["joints"]).max() > 0.02
     tracker, world = DynamicTracker(), World()
     tracker.begin(settled(two_notes.plan))
@@ -47,7 +45,7 @@ def test_with_noise_the_teacher_says_how_to_come_back(two_notes):
 
 
 def test_lessons_are_the_same_however_many_are_held_at_once(two_notes):
-    clips, config = [HumanClip(two_notes, song) for song in range(3)], LessonConfig()
+    clips, config = [replace(two_notes, song=song) for song in range(3)], LessonConfig()
     alone = [one.columns["action"] for one in hold_lessons(clips, config, jobs=1)]
     together = [one.columns["action"] for one in hold_lessons(clips, config, jobs=2)]
     np.testing.assert_array_equal(alone, together)
@@ -56,7 +54,8 @@ def test_lessons_are_the_same_however_many_are_held_at_once(two_notes):
 
 def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
     for number in range(5):
-        two_notes.save(tmp_path / f"{number}.npz")
+        replace(two_notes, song=number).save(tmp_path / f"{number}.npz")
+    replace(two_notes, split="test").save(tmp_path / "not for training.npz")
     out = tmp_path / "lessons.zarr"
     cli.main(["teach", str(tmp_path), "-o", str(out), "--jobs", "1", "--most", "2"])
     assert "played: 2," in capsys.readouterr().out
@@ -64,15 +63,21 @@ def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "config", [LessonConfig(noise=-1.0), LessonConfig(noise=float("nan")), LessonConfig(smooth=1.0)]
+    "config",
+    [
+        LessonConfig(noise=-1.0),
+        LessonConfig(noise=float("nan")),
+        LessonConfig(smooth=1.0),
+        LessonConfig(seed=-1),
+    ],
 )
 def test_settings_out_of_range_are_refused(two_notes, config):
     with pytest.raises(InputError):
-        next(hold_lessons([HumanClip(two_notes, 0)], config))
+        next(hold_lessons([two_notes], config))
 
 
 def test_who_says_something_else_is_refused(two_notes):
-    clips = [HumanClip(two_notes, 0)]
+    clips = [two_notes]
     weights = weights_folder()
     for config in (
         LessonConfig(pilot=weights / "high-diff.onnx"),
@@ -86,14 +91,31 @@ def test_who_says_something_else_is_refused(two_notes):
 def test_a_high_level_and_a_pilot_hold_a_lesson(two_notes):
     weights = weights_folder()
     config = LessonConfig(pilot=weights / "low-mse.onnx", planner=weights / "high-diff.onnx")
-    shown, usual = (hold_lesson(HumanClip(two_notes, 0), 0, one) for one in (config, QUIET))
+    shown, usual = (hold_lesson(two_notes, 0, one) for one in (config, QUIET))
     assert not np.array_equal(shown.columns["fingertips"], usual.columns["fingertips"])
     np.testing.assert_array_equal(shown.columns["goal"], usual.columns["goal"])
     assert np.isfinite(shown.columns["action"]).all()
+
+
+def test_another_seed_draws_otherwise(two_notes):
+    weights = weights_folder()
+    config = LessonConfig(planner=weights / "high-diff.onnx", noise=0.0)
+    one, again, other = (
+        hold_lesson(two_notes, 0, replace(config, seed=seed)).columns["fingertips"]
+        for seed in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(one, again)
+    assert not np.array_equal(one, other)
+
+
+def test_no_jobs_are_refused(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["teach", str(tmp_path), "--jobs", "0"])
+    assert "jobs must be 1 or more" in capsys.readouterr().err
 
 
 def test_a_pilot_that_is_no_low_level_is_refused(two_notes, tmp_path):
     (tmp_path / "pilot.onnx").write_bytes(b"not a network")
     config = LessonConfig(pilot=tmp_path / "pilot.onnx")
     with pytest.raises(InputError, match="damaged"):
-        next(hold_lessons([HumanClip(two_notes, 0)], config))
+        next(hold_lessons([two_notes], config))

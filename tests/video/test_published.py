@@ -65,6 +65,68 @@ def test_the_command(clip, tmp_path):
     files = sorted((tmp_path / "demos").iterdir())
     assert [file.name for file in files] == ["clips-000.npz", "clips-001.npz"]
     assert Demonstration.load(files[1]).score.title == "clips-001"
+    assert Demonstration.load(files[1]).split == "train"
+
+
+@pytest.fixture
+def four_clips(clip, tmp_path):
+    """Two for training, of one song; one of a test; and one of which nothing can be learned."""
+    tips, goal, _ = clip
+    source = tmp_path / "clips.npz"
+    np.savez(
+        source,
+        fingertips=np.concatenate([tips] * 4),
+        goal_packed=np.packbits(np.concatenate([goal] * 4), axis=1),
+        length=np.full(4, len(tips)),
+        song_group=np.array([3, 3, 5, 8]),
+        split=np.array(["train", "train", "test", "train"]),
+        odd=np.array([False, False, False, True]),
+    )
+    return source
+
+
+def test_what_is_not_for_training_is_left_out_of_it(four_clips, tmp_path):
+    pytest.importorskip("zarr")
+    from pianomime.learn.generalist.clips import read_human
+
+    cli.main(["import-demos", str(four_clips), "-o", str(tmp_path / "demos")])
+    made = [Demonstration.load(file) for file in sorted((tmp_path / "demos").iterdir())]
+    assert [(one.song, one.split) for one in made] == [
+        (3, "train"),
+        (3, "train"),
+        (5, "test"),
+        (8, "odd"),
+    ]
+    for source in (four_clips, tmp_path / "demos"):
+        titles = [one.score.title for one in read_human(source)]
+        assert titles == ["clips-000", "clips-001"]
+
+
+def test_a_file_of_before_there_were_splits_is_for_training(four_clips, tmp_path):
+    made, _ = list(read_published(four_clips))[2]
+    made.save(tmp_path / "one.npz")
+    with np.load(tmp_path / "one.npz") as file:
+        older = {name: file[name] for name in file.files if name not in ("song", "split")}
+    np.savez(tmp_path / "older.npz", **older)
+    there = Demonstration.load(tmp_path / "older.npz")
+    assert (there.song, there.split) == (-1, "train")
+    np.testing.assert_array_equal(there.plan.finger_key, made.plan.finger_key)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"song_group": np.array([1.5, 1, 1, 1])},
+        {"split": np.array(["train"])},
+        {"odd": np.array([0, 1, 0, 1])},
+    ],
+)
+def test_odd_marks_are_refused(four_clips, tmp_path, change):
+    with np.load(four_clips) as file:
+        arrays = {name: file[name] for name in file.files}
+    np.savez(tmp_path / "other.npz", **(arrays | change))
+    with pytest.raises(InputError, match="one a clip"):
+        list(read_published(tmp_path / "other.npz"))
 
 
 @pytest.fixture

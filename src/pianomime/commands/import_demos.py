@@ -15,7 +15,8 @@ class ImportDemos:
 
     SOURCE is a folder with PianoMime's high-level zarr data set, an .npz file of clips one after
     the other (length, fingertips, goal_packed), or one of a single clip (fingertips, goal). OUT
-    then holds one .npz for each clip.
+    then holds one .npz for each clip, also of those that are not for training; each tells which
+    it is, and `pianomime train` and `pianomime teach` leave these out.
 
     Examples:
       pianomime import-demos DATASET.zarr -o demos

@@ -51,7 +51,10 @@ class Teach:
         """
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
+        from pianomime.learn.config_check import within
 
+        if self.jobs is not None:
+            within("jobs", self.jobs, 1)
         played: list[float] = []
         with extra("train"), bars() as tell:
             from pianomime.learn.expert_data import write_expert_data

@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from pianomime.commands.named import named
+from pianomime.errors import InputError
 from pianomime.learn.generalist.config import STAGES, Size, StageConfig, StageName, stage_config
 
 
@@ -47,7 +48,10 @@ class Train:
     @classmethod
     def default(cls, arguments: list[str]) -> Train:
         """What holds for arguments that are not given: that is for stage and size to say."""
-        stage = next((name for name in STAGES if name in arguments), STAGES[0])
+        # Not what an option is given, such as a folder of that name.
+        after = zip(["", *arguments], arguments, strict=False)
+        alone = {argument for before, argument in after if not before.startswith("-")}
+        stage = next((name for name in STAGES if name in alone), STAGES[0])
         # Any other is refused when the command line is parsed.
         size: Size = "paper" if named("--size", arguments, "small") == "paper" else "small"
         return cls(stage=tyro.MISSING, config=stage_config(stage, size))
@@ -62,6 +66,8 @@ class Train:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
+        if _kind(self.config) != _kind(stage_config(self.stage)):
+            raise InputError(f"name the stage first: pianomime train {self.stage} ...")
         with extra("train"), bars() as tell:
             from pianomime.learn.generalist.training import train_stage
 
@@ -75,3 +81,8 @@ class Train:
                 lambda done, total, remark: tell(self.stage, done, total, remark),
             )
         print(f"saved: {made}")
+
+
+def _kind(config: StageConfig) -> tuple[str, str, str, bool]:
+    """What a stage's name stands for: defaults are taken by it, before arguments are parsed."""
+    return config.level, config.network, config.code, config.prior

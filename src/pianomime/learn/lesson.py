@@ -24,10 +24,10 @@ from pianomime.generalist.sampler import Sampler
 from pianomime.generalist.snap import flat_heights
 from pianomime.generalist.wanting import LearnedPlanner
 from pianomime.learn.episode import Episode, empty_columns, fill_columns, write_state
-from pianomime.learn.generalist.clips import HumanClip
 from pianomime.learn.lesson_config import LessonConfig, check_lessons
 from pianomime.plan.hand_path import settled
 from pianomime.track import DynamicTracker, IkTracker
+from pianomime.video.demonstration import Demonstration
 from pianomime.world import World
 from pianomime.world.hand import by_actuator
 
@@ -38,7 +38,7 @@ _REACH = by_actuator(1.0, 0.3, 0.03)
 """Noise [rad, m] of actuators that moves fingertips as 1 rad of a finger's does."""
 
 
-def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
+def hold_lesson(clip: Demonstration, number: int, config: LessonConfig) -> Episode:
     """Play a demonstration and write down the teacher's controls as `action`.
 
     Its fingertips are first settled as the robot's hands can have them (`settled`): these are what
@@ -47,31 +47,31 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
 
     Args:
         clip: what to play.
-        number: of the clip, from which it is drawn.
+        number: of the clip, from which it is drawn, with the config's seed.
         config: how.
 
     Raises:
         InputError: the pilot cannot be read.
     """
-    plan = clip.demonstration.plan
+    plan = clip.plan
     teacher, prior = DynamicTracker(), IkTracker()
-    pilot = teacher if config.pilot is None else load_follower(config.pilot, _QUICK)
+    draw = np.random.default_rng([config.seed, number])
+    spread = config.noise * draw.random() * _REACH
+    seeds = draw.integers(2**31, size=2).tolist()
+    pilot = teacher if config.pilot is None else load_follower(config.pilot, _QUICK, seeds[0])
     if config.planner is None:
         taught = settled(plan)
         shown = replace(taught, fingertips=flat_heights(taught.fingertips, taught.finger_key))
     else:
-        planner = LearnedPlanner(load_policy(config.planner, _QUICK), number)
-        shown = planner.plan(clip.demonstration.score)
+        planner = LearnedPlanner(load_policy(config.planner, _QUICK), seeds[1])
+        shown = planner.plan(clip.score)
         taught = settled(shown)
     teacher.begin(taught)
     prior.begin(shown)
     if pilot is not teacher:
         pilot.begin(shown)
-    draw = np.random.default_rng([config.seed, number])
-    spread = config.noise * draw.random() * _REACH
     added = np.zeros(46)
-    goal = clip.demonstration.score.roll()
-    pedal = clip.demonstration.score.pedal_roll()
+    goal, pedal = clip.score.roll(), clip.score.pedal_roll()
     columns = empty_columns(len(plan))
     world = World(quiet=True)
     for frame in range(len(plan)):
@@ -84,11 +84,11 @@ def hold_lesson(clip: HumanClip, number: int, config: LessonConfig) -> Episode:
         world.step(played + spread * added, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
     f1 = fill_columns(columns, goal, shown.fingertips, shown.finger_key)
-    return Episode(clip.demonstration.score.title, f1, "ik", columns, clip.song)
+    return Episode(clip.score.title, f1, "ik", columns, clip.song)
 
 
 def hold_lessons(
-    clips: Sequence[HumanClip], config: LessonConfig, jobs: int | None = None
+    clips: Sequence[Demonstration], config: LessonConfig, jobs: int | None = None
 ) -> Iterator[Episode]:
     """Lessons of many clips, in their order, several at a time.
 

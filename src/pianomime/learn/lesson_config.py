@@ -35,4 +35,5 @@ def check_lessons(config: LessonConfig) -> None:
     """
     within("noise", config.noise, 0, 1)
     within("smooth", config.smooth, 0, 0.99)
-    within("most", config.most, 0)
+    for name in ("most", "seed"):
+        within(name, getattr(config, name), 0)

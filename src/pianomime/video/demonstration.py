@@ -17,6 +17,8 @@ from pianomime.music import Score
 from pianomime.plan import NO_KEY, FingertipPlan
 from pianomime.video.rate import RATE
 
+TRAIN = "train"
+"""The split of what is for training."""
 _VERSION = 1
 _SCORE = ("key", "onset", "offset", "velocity", "pedal")
 _PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
@@ -33,6 +35,8 @@ class Demonstration:
         source: name of the video or data set.
         homography: (3, 3) from the video's pixels to world x, y [m]; all NaN if unknown.
         quality: figures that tell how good the source was: names to numbers, texts or lists.
+        song: number that demonstrations of one song share; -1 where nobody knows.
+        split: part of its data set that it belongs to; only "train" is for training.
     """
 
     score: Score
@@ -40,6 +44,8 @@ class Demonstration:
     source: str = ""
     homography: NDArray[np.float64] = field(default_factory=lambda: np.full((3, 3), np.nan))
     quality: dict[str, Any] = field(default_factory=dict)
+    song: int = -1
+    split: str = TRAIN
 
     def __post_init__(self) -> None:
         if len(self.plan) != self.score.frames():
@@ -98,6 +104,8 @@ class Demonstration:
             "score_title": np.array(self.score.title),
             "homography": self.homography,
             "quality": np.array(json.dumps(self.quality)),
+            "song": np.array(self.song),
+            "split": np.array(self.split),
         }
         for name in _SCORE:
             arrays[f"score_{name}"] = getattr(self.score, name)
@@ -129,6 +137,9 @@ class Demonstration:
             str(arrays["source"]),
             arrays["homography"],
             json.loads(str(arrays["quality"])),
+            # Not in files of older programs.
+            int(arrays.get("song", -1)),
+            str(arrays.get("split", TRAIN)),
         )
 
 

@@ -3,12 +3,16 @@
 Known faults are repaired: points that were never seen and stand where the robot rests (z above
 0.1), an older convention for z of pressing fingers, presses that were left over when a hand was not
 found, fingers that press keys nobody asked for, and jumps of single frames.
+
+An .npz file may tell of each clip its `song_group`, its `split`, and whether it is `odd`, of which
+nothing can be learned; such a clip is in the split "odd".
 """
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +24,7 @@ from pianomime.errors import InputError
 from pianomime.music import KEYS, Score
 from pianomime.plan import NO_KEY, FingertipPlan
 from pianomime.video.align import HIGH
-from pianomime.video.demonstration import Demonstration, on_grid
+from pianomime.video.demonstration import TRAIN, Demonstration, on_grid
 from pianomime.video.hand_tracks import at_rest
 from pianomime.video.strays import strays
 from pianomime.world.figures import key_centres
@@ -34,6 +38,7 @@ _JUMP = 0.10
 _WIDTHS = (212, 184)
 """Columns of the high-level data set's state and action."""
 _TIPS, _FINGERS = 36, 10
+_ODD = "odd"
 
 
 def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demonstration, int]]:
@@ -54,8 +59,9 @@ def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demo
     if len(clips) == 1:
         names = [source.stem]
     total = len(clips) if most is None else min(most, len(clips))
-    for (tips, goal), name in zip(clips[:total], names, strict=False):
-        yield demonstration_of(tips, goal, name, source.name), total
+    for clip, name in zip(clips[:total], names, strict=False):
+        made = demonstration_of(clip.fingertips, clip.goal, name, source.name)
+        yield replace(made, song=clip.song, split=clip.split), total
 
 
 def demonstration_of(
@@ -159,7 +165,14 @@ def _pressed(tips: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.where(low & (off.min(axis=3) < _ON_KEY), nearest, NO_KEY)
 
 
-_Clip = tuple[NDArray[np.float64], NDArray[np.bool_] | None]
+@dataclass(frozen=True, eq=False)
+class _Clip:
+    """Fingertips (T, 2, 6, 3), goals (T, 88) if they are told, and where in its data set it is."""
+
+    fingertips: NDArray[np.float64]
+    goal: NDArray[np.bool_] | None
+    song: int = -1
+    split: str = TRAIN
 
 
 def _npz(path: Path) -> list[_Clip]:
@@ -182,10 +195,24 @@ def _npz(path: Path) -> list[_Clip]:
         raise InputError(f"{path}: the lengths of the clips must be whole numbers from 1 on")
     if int(length.sum()) != len(tips):
         raise InputError(f"{path}: the lengths of the clips do not add up to {len(tips)} frames")
+    song = arrays.get("song_group", np.full(len(length), -1))
+    split = arrays.get("split", np.full(len(length), TRAIN))
+    odd = arrays.get("odd", np.zeros(len(length), bool))
+    kinds = (song.dtype.kind in "iu", split.dtype.kind == "U", odd.dtype == bool)
+    if not all(kinds) or not len(song) == len(split) == len(odd) == len(length):
+        raise InputError(
+            f"{path}: song_group, split and odd must be whole numbers, texts and booleans, "
+            "one a clip"
+        )
     ends = np.cumsum(length)
     return [
-        (tips[end - frames : end], None if goal is None else goal[end - frames : end])
-        for end, frames in zip(ends, length, strict=True)
+        _Clip(
+            tips[end - frames : end],
+            None if goal is None else goal[end - frames : end],
+            int(song[clip]),
+            _ODD if odd[clip] else str(split[clip]),
+        )
+        for clip, (end, frames) in enumerate(zip(ends, length, strict=True))
     ]
 
 
@@ -225,5 +252,5 @@ def _zarr(folder: Path) -> list[_Clip]:
         goal = np.zeros((len(rows), KEYS), bool)
         frame, _ = np.nonzero((keys >= 0) & (keys < KEYS))
         goal[frame, keys[(keys >= 0) & (keys < KEYS)]] = True
-        clips.append((tips, goal))
+        clips.append(_Clip(tips, goal))
     return clips

@@ -10,21 +10,23 @@ from pianomime.errors import InputError
 from pianomime.generalist.features import base
 from pianomime.generalist.policy import load_policy
 from pianomime.generalist.sampler import Sampler
-from pianomime.learn.generalist.config import STAGES, DiffusionConfig, stage_config
+from pianomime.learn.generalist.config import STAGES, DiffusionConfig, check_stage, stage_config
 from pianomime.learn.generalist.export import export_stage, torch_policy
 from pianomime.learn.generalist.stage import SaidScale, Stage
 from pianomime.learn.generalist.unet import FrameConvolution, TemporalEncoder
 from pianomime.learn.generalist.windows import Windows
+from pianomime.learn.goal.autoencoder import GoalEncoder
 
 SEEN = ("goal", "frames", "vector")
 TINY = DiffusionConfig(channels=(16, 32, 32), condition=(32,), step_width=16)
 
 
-def a_stage(clips, name, size="small", **changes):
-    config = replace(stage_config(name, size), code="binary", tip_noise=0.0, **changes)
+def a_stage(clips, name, size="small", encoder=None, **changes):
+    code = "binary" if encoder is None else "sdf"
+    config = replace(stage_config(name, size), code=code, tip_noise=0.0, **changes)
     sample = Windows.of(clips, config).some(57)
     torch.manual_seed(0)
-    stage = Stage(config, {key: value.shape[1:] for key, value in sample.items()}, None)
+    stage = Stage(config, {key: value.shape[1:] for key, value in sample.items()}, encoder)
     return stage, sample
 
 
@@ -66,6 +68,59 @@ def test_the_papers_size_has_as_many_parameters_as_table_7_makes(clips, name):
     assert stage.parameters_learned == pytest.approx(by_hand(stage), rel=0.05)
 
 
+@pytest.mark.parametrize("name", ["high-bet", "low-bet"])
+def test_so_has_a_transformer_as_table_8_makes(clips, name):
+    with torch.device("meta"):
+        stage, _ = a_stage(clips, name, "paper")
+    (channels, vector), out = seen_widths(stage), len(stage.target.middle)
+    wide, bins = 120, 64
+    frames = (10 if name == "high-bet" else 4) + 1 + 4
+    layer = 4 * wide * wide + 4 * wide + 8 * wide * wide + 5 * wide + 4 * wide
+    count = (channels + vector + 2) * wide + frames * wide + 8 * layer + 2 * wide
+    count += (wide + 1) * bins * (1 + out)
+    assert stage.parameters_learned == count
+
+
+def test_so_has_the_plain_network_of_appendix_g(clips):
+    with torch.device("meta"):
+        stage, _ = a_stage(clips, "bc-mse", "paper")
+    given = 4 * 88 + seen_widths(stage)[1]
+    count = (given + 1) * 1024 + 2 * 1025 * 1024 + 3 * 2 * 1024 + 1025 * 46
+    assert stage.parameters_learned == count
+
+
+@pytest.mark.parametrize("name", STAGES)
+@pytest.mark.parametrize("size", ["small", "paper"])
+def test_the_configs_that_there_are_can_be_trained(name, size):
+    check_stage(stage_config(name, size))
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "change"),
+    [
+        ("high-diff", None, {"tip_noise": -1.0}),
+        ("low-diff", None, {"target_noise": float("nan")}),
+        ("low-diff", "diffusion", {"channels": (20, 40)}),
+        ("low-diff", "diffusion", {"channels": (8, 8, 8, 8)}),
+        ("low-diff", "diffusion", {"channels": ()}),
+        ("low-diff", "diffusion", {"encoder": ()}),
+        ("low-diff", "diffusion", {"kernel": 4}),
+        ("low-diff", "diffusion", {"step_width": 7}),
+        ("low-diff", "diffusion", {"condition": (0,)}),
+        ("low-diff", "diffusion", {"steps": 1}),
+        ("low-bet", "bet", {"heads": 7}),
+        ("low-bet", "bet", {"bins": 1}),
+        ("bc-mse", "mlp", {"hidden": (64, 0)}),
+        ("bc-mse", "fit", {"steps": 0}),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused(name, part, change):
+    config = stage_config(name)
+    changed = change if part is None else {part: replace(getattr(config, part), **change)}
+    with pytest.raises(InputError, match=r"must|levels"):
+        check_stage(replace(config, **changed))
+
+
 @pytest.mark.parametrize("name", STAGES)
 def test_what_is_said_has_the_shape_of_what_should_be(clips, name):
     stage, sample = a_stage(clips, name)
@@ -76,9 +131,10 @@ def test_what_is_said_has_the_shape_of_what_should_be(clips, name):
     assert np.isfinite(told).all()
 
 
+@pytest.mark.parametrize("coded", [False, True])
 @pytest.mark.parametrize("name", STAGES)
-def test_onnx_says_what_torch_says(clips, name, tmp_path):
-    stage, sample = a_stage(clips, name, diffusion=TINY)
+def test_onnx_says_what_torch_says(clips, name, coded, tmp_path):
+    stage, sample = a_stage(clips, name, encoder=GoalEncoder() if coded else None, diffusion=TINY)
     stage.fit_scales(sample)
     export_stage(stage, name, tmp_path / "stage.onnx")
     # As precise as what is in the file.
@@ -97,7 +153,16 @@ def test_onnx_says_what_torch_says(clips, name, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "steps"), [("high-diff", 250), ("high-bet", 150), ("bc-mse", 150)]
+    ("name", "steps"),
+    [
+        ("high-diff", 250),
+        ("high-bet", 150),
+        ("low-diff", 250),
+        ("low-diff-res", 250),
+        ("low-bet", 150),
+        ("one-stage-diff", 250),
+        ("bc-mse", 150),
+    ],
 )
 def test_it_learns_a_clip_by_heart(clips, name, steps):
     stage, sample = a_stage(clips, name, diffusion=TINY)
@@ -153,6 +218,17 @@ def test_scales_are_taken_back():
     assert scaled.abs().max() <= 1
     kept = scaled.abs() < 1
     torch.testing.assert_close(scale.undo(scaled)[kept], inside[kept], rtol=1e-3, atol=1e-6)
+
+
+def test_what_hardly_ever_changes_does_no_harm(clips):
+    """A key that is down in one sample of thousands."""
+    stage, sample = a_stage(clips, "low-diff")
+    many = {key: np.repeat(value, 100, axis=0) for key, value in sample.items()}
+    many["vector"][:, -1] = 0.0
+    many["vector"][0, -1] = 1.0
+    stage.fit_scales(many)
+    _, vector = stage.seen(*(torch.from_numpy(many[key]) for key in SEEN))
+    assert vector.abs().max() <= 8.0
 
 
 def test_columns_that_never_change_do_no_harm(clips):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pianomime import Player
+from pianomime import Player, cli
 from pianomime.errors import InputError
 from pianomime.generalist.methods import WEIGHTS
 from pianomime.learn.episode import COLUMNS, Episode
@@ -31,7 +31,7 @@ def data(two_notes: Demonstration, tmp_path_factory: pytest.TempPathFactory) -> 
     demos.mkdir()
     songs.mkdir()
     for number in range(15):
-        two_notes.save(demos / f"{number:02d}.npz")
+        replace(two_notes, song=number).save(demos / f"{number:02d}.npz")
     for number in range(2):
         moved = replace(two_notes.score, key=two_notes.score.key + number)
         moved.to_midi(songs / f"{number}.mid")
@@ -76,6 +76,27 @@ def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
     assert weights.stat().st_mtime_ns == written
     with pytest.raises(InputError, match="tip_noise"):
         train("high-diff-no-sdf", data, tmp_path, tip_noise=0.5)
+
+
+def test_what_another_goal_encoder_trained_is_not_gone_on_with(data, tmp_path):
+    train("high-diff", data, tmp_path)
+    config = GoalConfig(fit=replace(SHORT, bfloat16=False, seed=1))
+    train_goal([data / "songs"], tmp_path / "goal", config, lambda *_: None, lambda *_: None)
+    config = replace(stage_config("high-diff"), diffusion=TINY, fit=SHORT)
+    with pytest.raises(InputError, match="goal_encoder"):
+        train_stage("high-diff", config, tmp_path, data / "demos", [], tmp_path / "goal")
+
+
+def test_a_folder_of_the_name_of_another_stage(data, tmp_path, capsys):
+    """The defaults are those of the stage that is named, wherever it stands."""
+    experts, out = str(data / "experts.zarr"), str(tmp_path / "low-mse")
+    short = ["--fit.steps", "2", "--fit.batch", "4", "--fit.warmup", "0", "--mlp.hidden", "8"]
+    cli.main(["train", "bc-mse", "--experts", experts, "-o", out, *short])
+    assert "bc-mse.onnx" in capsys.readouterr().out
+    cli.main(["train", "-o", out, "bc-mse", "--experts", experts, *short])
+    with pytest.raises(SystemExit):
+        cli.main(["train", "--diffusion.no-guess", "bc-mse", "--experts", experts])
+    assert "name the stage first" in capsys.readouterr().err
 
 
 def test_what_is_missing_is_named(data, tmp_path):

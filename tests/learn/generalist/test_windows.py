@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pianomime.generalist.features import base, octave, rest_tips, to_world
+from pianomime.learn.generalist.clips import Clips
 from pianomime.learn.generalist.config import STAGES, stage_config
 from pianomime.learn.generalist.windows import Windows
 from pianomime.world.hand import SIDES, Hand
@@ -99,6 +100,22 @@ def test_no_song_is_on_both_sides_of_the_split(clips):
     assert len(held)
     assert not set(learned.song.tolist()) & set(held.song.tolist())
     assert len(learned) + len(held) == 3
+
+
+def test_a_song_is_kept_whatever_else_there_is(clips):
+    def kept(songs):
+        many = Clips(
+            {"goal": np.zeros((len(songs), 88), bool)},
+            np.arange(len(songs)) + 1,
+            np.array(songs),
+            ["a clip"] * len(songs),
+        )
+        return set(many.split()[1].song.tolist())
+
+    every = kept(range(400))
+    assert 15 < len(every) < 60
+    assert kept(range(200)) == {song for song in every if song < 200}
+    assert kept([*range(399, -1, -1), 3, 3]) == every
 
 
 def test_noise_moves_the_targets_of_idle_fingertips_alone(clips):

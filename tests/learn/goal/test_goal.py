@@ -118,6 +118,17 @@ def test_it_learns_where_keys_are(folder, tmp_path):
     assert after.error_mm < 0.5 * before.error_mm
 
 
+def test_the_same_seed_learns_the_same(folder, tmp_path):
+    def codes(name, seed):
+        fit = FitConfig(steps=5, batch=16, warmup=1, seed=seed, bfloat16=False)
+        train_goal([folder], tmp_path / name, GoalConfig(fit=fit), quiet, quiet)
+        return load_encoder(tmp_path / name)(torch.eye(88))
+
+    one = codes("one", 0)
+    torch.testing.assert_close(one, codes("again", 0), rtol=0, atol=0)
+    assert not torch.equal(one, codes("other", 1))
+
+
 def test_files_are_on_one_side_only(folder):
     first, again = (read_goals([folder], 0.3, quiet) for _ in range(2))
     assert first.train.digest == again.train.digest

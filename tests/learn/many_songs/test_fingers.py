@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 from stable_baselines3.common.vec_env import VecCheckNan
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from pianomime import Player
 from pianomime.errors import InputError
@@ -32,6 +33,13 @@ def silent(given):
     return [np.zeros((10, 5), np.float32)]
 
 
+def curve(folder):
+    """What TensorBoard shows of a training."""
+    shown = EventAccumulator(str(FitFolder(folder).tensorboard))
+    shown.Reload()
+    return shown.Scalars("fingers/reward")
+
+
 def moved(score, keys):
     return replace(score, key=score.key + keys)
 
@@ -47,29 +55,46 @@ def test_who_adds_nothing_plays_as_the_dynamic_tracker_does(two_notes):
         world.step(ctrl)
 
 
+class _Aiming:
+    """A tracker that aims at these points, along these joints."""
+
+    def __init__(self, aim, path):
+        self._aim, self._path = aim, path
+
+    def aim(self, frame):
+        return self._aim, self._path
+
+
 def test_left_fingers_are_told_what_right_ones_are_in_a_mirror(two_notes):
     """Of a plan and a world that are their own mirror images: about a D, also keys are."""
     plan = PlannedSong.of(two_notes.score).demonstration.plan
     low, high, centre = 31, 51, key_centres()[41, 1]
-    mirrored = [0, 2 * centre, 0]
-    tips = plan.fingertips.copy()
-    tips[:, 0] = tips[:, 1] * [1, -1, 1] + mirrored
     keys = np.full_like(plan.finger_key, -1)
     keys[6:16, 0, 1], keys[6:16, 1, 1] = low, high
-    plan = FingertipPlan(tips, keys, plan.note_hand, plan.note_finger)
-    tracker = DynamicTracker()
-    tracker.begin(plan)
-    around, world = Surroundings(plan, tracker), World()
+    keys[9:16, 0, 3], keys[9:16, 1, 3] = low - 5, high + 5
+
+    def both(right):
+        """Points (..., 3) of the left hand and of the right."""
+        return np.array([right * [1, -1, 1] + [0, 2 * centre, 0], right])
+
     draw = np.random.default_rng(0)
-    pose = draw.normal(0, 0.05, 27)
-    points = np.array([[0.0, -0.2, 0.1]] + [[0.04, -0.15 + 0.02 * n, 0.02] for n in range(5)])
-    both = np.array([points * [1, -1, 1] + mirrored, points])
-    told = around.look(
-        8, np.r_[np.zeros(88), pose, pose], world.qvel_hands, world.key_state, both
-    ).reshape(2, 5, SIZE)
-    # The tracker began at rest: the paths of its joints are not in the mirror.
-    same = SIZE - 12
-    np.testing.assert_allclose(told[0, :, : same - 11], told[1, :, : same - 11], atol=1e-4)
+    beside = key_centres()[high] - [0.0, 0.03, 0.0]
+    points = beside + [0, 0.014, 0] * np.arange(6)[:, None] + draw.normal(0, 0.003, (6, 3))
+    aim = points[1:] + draw.normal(0, 0.01, (5, 3))
+    mirror = np.r_[-1.0, np.ones(26)]
+    pose, path, velocity = draw.normal(0, 0.05, (3, 27))
+    state = np.zeros(88)
+    state[: 2 * 41 + 1] = draw.random(2 * 41 + 1)
+    state[: 2 * 41 + 1] = np.maximum(state[: 2 * 41 + 1], state[2 * 41 :: -1])
+    around = Surroundings(
+        FingertipPlan(plan.fingertips, keys, plan.note_hand, plan.note_finger),
+        _Aiming(both(aim), np.array([path * mirror, path])),
+    )
+    qpos, qvel = (np.r_[right, right * mirror] for right in (pose, velocity))
+    told = around.look(8, np.r_[np.zeros(88), qpos], qvel, state, both(points))
+    left, right = told.reshape(2, 5, SIZE)
+    np.testing.assert_allclose(left, right, atol=1e-4)
+    assert (np.ptp(right, axis=0) > 0).sum() > 30
 
 
 def test_each_finger_moves_its_own_actuators_and_no_further_than_it_may():
@@ -174,6 +199,11 @@ def test_a_training_that_was_stopped_comes_to_the_same(songs, tmp_path, monkeypa
     with pytest.raises(KeyboardInterrupt):
         train_fingers([songs], tmp_path / "parts", SMALL, 1, tell=stop)
     train_fingers([songs], tmp_path / "parts", SMALL, 1)
+    # The curve goes on where it was, and what came before is still shown.
+    one, other = (
+        [event.step for event in curve(tmp_path / name / "fingers")] for name in ("whole", "parts")
+    )
+    assert one == other
     one, other = (
         FitFolder(tmp_path / name / "fingers").weights()[0] for name in ("whole", "parts")
     )
@@ -201,11 +231,20 @@ def test_the_file_says_what_the_network_says(songs, tmp_path):
 
 @pytest.mark.parametrize(
     "change",
-    [{"frames": 0}, {"batch": 1}, {"learning_rate": 0.0}, {"discount": 1.5}, {"worlds": 200}],
+    [
+        {"frames": 0},
+        {"batch": 1},
+        {"learning_rate": 0.0},
+        {"discount": 1.5},
+        {"worlds": 200},
+        {"worlds": 3},
+        {"hidden": (0,)},
+    ],
 )
 def test_settings_with_which_nothing_can_be_learned_are_refused(songs, tmp_path, change):
     with pytest.raises(InputError):
         train_fingers([songs], tmp_path / "out", replace(SMALL, **change), 1)
+    assert not (tmp_path / "out").exists()
 
 
 def test_too_few_songs_are_refused(two_notes, tmp_path):

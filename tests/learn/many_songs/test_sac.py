@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from stable_baselines3 import SAC
 
 from pianomime import Player
 from pianomime.errors import InputError
 from pianomime.generalist.methods import WEIGHTS
+from pianomime.generalist.policy import load_network
+from pianomime.learn.sac import training
 from pianomime.learn.sac.config import SacConfig
 from pianomime.learn.sac.training import STEPS, AskedSong, SacVecEnv, train_sac
 
@@ -47,7 +50,31 @@ def test_what_was_trained_plays(two_notes, tmp_path, monkeypatch):
     assert made.stat().st_mtime_ns == written
 
 
-@pytest.mark.parametrize("change", [{"frames": 0}, {"buffer": 4}, {"discount": -0.1}])
+def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch):
+    """Of what the environment shows, the mean of its actions, in steps of the actuators."""
+    songs, kept = tmp_path / "songs", []
+    songs.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+
+    class Kept(SAC):
+        def __init__(self, policy, env, **settings):
+            super().__init__(policy, env, **settings)
+            kept.append((self, env))
+
+    monkeypatch.setattr(training, "SAC", Kept)
+    made = train_sac([songs], tmp_path / "out", SMALL, 1)
+    (model, env), (run, _) = kept[0], load_network(made)
+    scaled = env.see()[:, 0]
+    env.scale = None
+    plain = env.see()[:, 0]
+    wanted = STEPS * model.predict(scaled, deterministic=True)[0]
+    given = {"goal": plain[:, : 4 * 88].reshape(-1, 4, 88), "vector": plain[:, 4 * 88 :]}
+    np.testing.assert_allclose(run(given)[0][:, 0], wanted, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "change", [{"frames": 80}, {"buffer": 4}, {"discount": -0.1}, {"hidden": (16, 0)}]
+)
 def test_settings_out_of_range_are_refused(two_notes, tmp_path, change):
     two_notes.score.to_midi(tmp_path / "one.mid")
     with pytest.raises(InputError):

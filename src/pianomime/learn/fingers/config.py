@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pianomime.errors import InputError
 from pianomime.learn.config_check import above_zero, within
 
 
@@ -57,3 +58,10 @@ def check_fingers(config: FingersConfig) -> None:
         within(name, getattr(config, name), 0, 1)
     for name in ("effort", "wrong", "seed"):
         within(name, getattr(config, name), 0)
+    for width in config.hidden:
+        within("hidden", width, 1)
+    if config.frames_per_update % config.worlds:
+        raise InputError(
+            f"frames-per-update ({config.frames_per_update}) must be a multiple of worlds "
+            f"({config.worlds})"
+        )

@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from stable_baselines3.common.logger import Logger
 
-from pianomime.errors import InputError
 from pianomime.generalist.fingers import SIZE, FingerTracker
 from pianomime.generalist.methods import FINGERS
 from pianomime.learn.config_check import within
@@ -61,6 +60,7 @@ def train_fingers(
         OSError: a file cannot be read or written.
     """
     check_fingers(config)
+    within("threads", threads, 0)
     paths = find_songs(folders)
     within("number of songs", len(paths), _MEASURED + 1)
     with stage_folder(out, FINGERS, config, paths) as (folder, result):
@@ -76,11 +76,12 @@ def train_fingers(
         env = FingersVecEnv(learned, config, threads)
         model = _model(env, config)
         model.threads = threads or torch.get_num_threads()
-        with closing(RunLog(folder.tensorboard, 1)) as log:
+        state = folder.state()
+        since = 1 if state is None else state[1] + 1
+        with closing(RunLog(folder.tensorboard, since)) as log:
             boundary = _Boundary(folder, env, config, log, tell)
             boundary.init_callback(model)
             model.set_logger(Logger(None, []))
-            state = folder.state()
             if state is not None:
                 boundary.resume(*state, folder.path)
             model.learn(
@@ -98,15 +99,12 @@ def train_fingers(
 
 
 def _model(env: FingersVecEnv, config: FingersConfig) -> Ppo:
-    steps = config.frames_per_update // config.worlds
-    if steps < 1:
-        raise InputError("frames-per-update must be worlds or more")
     hidden = list(config.hidden)
     return Ppo(
         "MlpPolicy",
         env,
         learning_rate=lambda left: config.learning_rate * max(left, 0.0),
-        n_steps=steps,
+        n_steps=config.frames_per_update // config.worlds,
         batch_size=config.batch,
         n_epochs=config.epochs,
         gamma=config.discount,

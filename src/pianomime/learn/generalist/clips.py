@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,18 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.archive import read_arrays
 from pianomime.errors import InputError
 from pianomime.learn.expert_data import ExpertData
-from pianomime.video.demonstration import Demonstration
+from pianomime.video.demonstration import TRAIN, Demonstration
 from pianomime.video.published import read_published
 
 HUMAN = ("goal", "fingertips")
 """Columns of clips of humans."""
 EXPERT = (*HUMAN, "joints", "velocities", "keys", "prior", "action")
 """Columns of clips of experts, as `pianomime.learn.episode.COLUMNS` describes them."""
-_HELD_OUT = 12
-"""Every how manieth song is kept from training, to see how well it generalises."""
+_HELD_OUT = 1 / 12
+"""Share of the songs that is kept from training, to see how well it generalises."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,66 +69,52 @@ class Clips:
         return digest.hexdigest()[:16]
 
     def split(self) -> tuple[Clips, Clips]:
-        """To learn from, and to see how well that went: no song is on both sides."""
+        """To learn from, and to see how well that went: no song is on both sides.
+
+        Which songs are kept does not depend on what else there is.
+        """
         held = _held(self.song)
         return self.some(~held), self.some(held)
 
 
-@dataclass(frozen=True, eq=False)
-class HumanClip:
-    """A demonstration to learn from.
-
-    Attributes:
-        demonstration: it.
-        song: number that clips of one song share.
-    """
-
-    demonstration: Demonstration
-    song: int
-
-
-def read_human(source: Path) -> list[HumanClip]:
-    """Demonstrations to learn from.
+def read_human(source: Path) -> list[Demonstration]:
+    """Demonstrations to learn from: those of the split "train".
 
     Args:
         source: a folder of demonstrations, as `retarget` and `import-demos` write them, or an .npz
-            file of published clips (length, fingertips, goal_packed). Of a file that tells `split`
-            only what is called "train" is taken, and its `song_group` tells which are of one song.
+            file of published clips, see `read_published`.
 
     Raises:
         OSError: there is no such file.
         InputError: it holds no demonstrations.
     """
     if source.is_dir():
-        files = sorted(source.rglob("*.npz"))
-        found = [HumanClip(Demonstration.load(file), song) for song, file in enumerate(files)]
+        found = [Demonstration.load(file) for file in sorted(source.rglob("*.npz"))]
     else:
-        arrays = read_arrays(source, "an .npz file of arrays")
-        count = len(arrays.get("length", [0]))
-        song = arrays.get("song_group", np.arange(count))
-        split = arrays.get("split", np.full(count, "train"))
-        odd = arrays.get("odd", np.zeros(count, bool))
-        if not len(song) == len(split) == len(odd) == count:
-            raise InputError(f"{source}: song_group, split and odd must have a value a clip")
-        found = [
-            HumanClip(demonstration, int(song[number]))
-            for number, (demonstration, _) in enumerate(read_published(source))
-            if split[number] == "train" and not odd[number]
-        ]
+        found = [demonstration for demonstration, _ in read_published(source)]
+    found = [demonstration for demonstration in found if demonstration.split == TRAIN]
     if not found:
         raise InputError(f"{source}: holds nothing to train on")
     return found
 
 
-def held_out(clips: Sequence[HumanClip]) -> list[HumanClip]:
+def held_out(clips: Sequence[Demonstration]) -> list[Demonstration]:
     """The clips that are kept from training, as `Clips.split` keeps those of all data sets."""
-    kept = _held(np.array([clip.song for clip in clips]))
+    kept = _held(np.array([_song(clip.song, clip.score.title) for clip in clips]))
     return [clip for clip, one in zip(clips, kept, strict=True) if one]
 
 
 def _held(song: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Songs whose number's hash is low: at least one of them, and not all."""
     songs = np.unique(song)
-    return np.isin(song, songs[min(_HELD_OUT // 2, len(songs) // 2) :: _HELD_OUT])
+    place = np.array([zlib.crc32(str(number).encode()) / 2**32 for number in songs])
+    held = ((place < _HELD_OUT) | (place == place.min())) & (place < place.max())
+    return np.isin(song, songs[held])
+
+
+def _song(number: int, title: str) -> int:
+    """The number of a song; where nobody knows it, clips of one title are of one song."""
+    return number if number >= 0 else zlib.crc32(title.encode())
 
 
 def human_clips(source: Path) -> Clips:
@@ -142,11 +128,11 @@ def human_clips(source: Path) -> Clips:
         source,
         (
             (
-                clip.demonstration.score.title,
-                clip.song,
+                clip.score.title,
+                _song(clip.song, clip.score.title),
                 {
-                    "goal": clip.demonstration.score.roll(),
-                    "fingertips": clip.demonstration.plan.fingertips.astype(np.float32),
+                    "goal": clip.score.roll(),
+                    "fingertips": clip.plan.fingertips.astype(np.float32),
                 },
             )
             for clip in read_human(source)
@@ -157,7 +143,7 @@ def human_clips(source: Path) -> Clips:
 def expert_clips(sources: Sequence[Path], columns: Sequence[str] = EXPERT) -> Clips:
     """How experts play, or teachers would: the episodes of data sets that are for training.
 
-    Episodes of different data sets are of one song where these tell the same number.
+    Episodes of different data sets are of one song where these tell the same number, or name.
 
     Args:
         sources: data sets.
@@ -171,10 +157,9 @@ def expert_clips(sources: Sequence[Path], columns: Sequence[str] = EXPERT) -> Cl
         for source in sources:
             data = ExpertData.open(source)
             for number, about in enumerate(data.episodes):
-                if about["split"] == "train":
-                    arrays = data.columns(number, columns)
-                    song = about["song"] if about["song"] >= 0 else -number - 1
-                    yield about["name"], song, arrays
+                if about["split"] == TRAIN:
+                    song = _song(about["song"], about["name"])
+                    yield about["name"], song, data.columns(number, columns)
 
     return _together(", ".join(map(str, sources)), clips())
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
+import tyro
+
+from pianomime.errors import InputError
 from pianomime.generalist.horizon import CHUNK
-from pianomime.learn.fit_config import FitConfig
+from pianomime.learn.config_check import above_zero, within
+from pianomime.learn.fit_config import FitConfig, check_fit
 
 Size = Literal["small", "paper"]
 StageName = Literal[
@@ -22,6 +26,10 @@ StageName = Literal[
     "bc-mse",
 ]
 STAGES: tuple[StageName, ...] = get_args(StageName)
+
+
+GROUPS = 8
+"""Of the channels of a convolution, each normalised by itself."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +58,13 @@ class DiffusionConfig:
 
 @dataclass(frozen=True)
 class BetConfig:
-    """A behaviour transformer: which of some typical chunks, and how far off (paper, table 8)."""
+    """A behaviour transformer: which of some typical actions, and how far off (paper, table 8)."""
 
     layers: int = 4
     heads: int = 4
     width: int = 64
     bins: int = 64
-    """Typical chunks."""
+    """Typical actions: what is said of one frame."""
     offset_weight: float = 10.0
     """Of the loss of the offset, beside that of the choice."""
 
@@ -71,15 +79,15 @@ class MlpConfig:
 
 @dataclass(frozen=True)
 class StageConfig:
-    """One network of a generalist."""
+    """One network of a generalist. The first four are what its name stands for."""
 
-    level: Literal["high", "low", "whole"]
+    level: Annotated[Literal["high", "low", "whole"], tyro.conf.Suppress]
     """From goals to fingertips, from fingertips to controls, or from goals to controls at once."""
-    network: Literal["diffusion", "bet", "mlp"]
+    network: Annotated[Literal["diffusion", "bet", "mlp"], tyro.conf.Suppress]
     """Its kind."""
-    code: Literal["sdf", "binary"] = "sdf"
+    code: Annotated[Literal["sdf", "binary"], tyro.conf.Suppress] = "sdf"
     """How goals are told: by the goal encoder, or as they are."""
-    prior: bool = False
+    prior: Annotated[bool, tyro.conf.Suppress] = False
     """Whether controls are told as what to add to those of inverse kinematics."""
     transpose: bool = True
     """Whether samples are moved by octaves by chance."""
@@ -100,6 +108,56 @@ class StageConfig:
     def chunk(self) -> int:
         """Frames that are said at once; a feedforward network says the next one."""
         return 1 if self.network == "mlp" else CHUNK
+
+
+def check_stage(config: StageConfig) -> None:
+    """Refuse settings out of range, or that do not fit together.
+
+    Raises:
+        InputError: the first of them, as it is called on the command line.
+    """
+    for name in ("tip_noise", "hand_noise", "target_noise"):
+        within(name, getattr(config, name), 0, 1)
+    {"diffusion": _check_diffusion, "bet": _check_bet, "mlp": _check_mlp}[config.network](config)
+    check_fit(config.fit)
+
+
+def _check_diffusion(stage: StageConfig) -> None:
+    config = stage.diffusion
+    levels = len(config.channels)
+    if not levels or CHUNK % 2 ** (levels - 1):
+        raise InputError(
+            f"diffusion.channels: a U-Net over {CHUNK} frames has 1 to 3 levels, not {levels}"
+        )
+    for name in ("channels", "encoder"):
+        widths = getattr(config, name)
+        if not widths or any(width < 1 or width % GROUPS for width in widths):
+            raise InputError(f"diffusion.{name} must be multiples of {GROUPS}, not {widths}")
+    for name in ("kernel", "encoder_kernel"):
+        size = getattr(config, name)
+        if size < 1 or not size % 2:
+            raise InputError(f"diffusion.{name.replace('_', '-')} must be odd, not {size}")
+    for width in config.condition:
+        within("diffusion.condition", width, 1)
+    if config.step_width < 4 or config.step_width % 2:
+        raise InputError(f"diffusion.step-width must be even, from 4 on, not {config.step_width}")
+    within("diffusion.steps", config.steps, 2)
+
+
+def _check_bet(stage: StageConfig) -> None:
+    config = stage.bet
+    for name, least in (("layers", 1), ("heads", 1), ("width", 1), ("bins", 2)):
+        within(f"bet.{name}", getattr(config, name), least)
+    if config.width % config.heads:
+        raise InputError(
+            f"bet.width ({config.width}) must be a multiple of bet.heads ({config.heads})"
+        )
+    above_zero("bet.offset_weight", config.offset_weight)
+
+
+def _check_mlp(stage: StageConfig) -> None:
+    for width in stage.mlp.hidden:
+        within("mlp.hidden", width, 1)
 
 
 _TIPS, _HANDS = 0.01, 0.06

@@ -11,12 +11,15 @@ from torch import Tensor, nn
 
 _FLAT = 1e-4
 """Numbers that vary less than this in the data are not scaled up."""
+_FAR = 8.0
+"""Deviations beyond which numbers that are seen are as if they were there. Some are nearly always
+alike: a key that is seldom down would be hundreds of deviations away when it is."""
 _TAIL = 0.0005
 """Share of the values of what is said, at either end, that its range leaves out."""
 
 
 class Scale(nn.Module):
-    """Mean 0 and deviation 1, for what is seen.
+    """Mean 0 and deviation 1, within -8..8, for what is seen.
 
     Attributes:
         middle, spread: (D,) what becomes 0, and what lies 1 from it; a part of the weights.
@@ -41,7 +44,7 @@ class Scale(nn.Module):
 
     def forward(self, values: Tensor) -> Tensor:
         """Scaled."""
-        return (values - self.middle) / self.spread
+        return ((values - self.middle) / self.spread).clamp(-_FAR, _FAR)
 
 
 class SaidScale(nn.Module):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -15,14 +16,14 @@ from pianomime.generalist.features import base, to_world
 from pianomime.generalist.sampler import Sampler
 from pianomime.learn.fit import fit
 from pianomime.learn.generalist.clips import EXPERT, HUMAN, Clips, expert_clips, human_clips
-from pianomime.learn.generalist.config import StageConfig
+from pianomime.learn.generalist.config import StageConfig, check_stage
 from pianomime.learn.generalist.export import export_stage, torch_policy
 from pianomime.learn.generalist.stage import Stage
 from pianomime.learn.generalist.windows import Windows
 from pianomime.learn.tell import Tell
 
 _SCALED_BY = 20_000
-"""Samples from which scales are taken."""
+"""Samples, drawn as those that are learned from, from which scales are taken."""
 _MEASURED = 1024
 """Samples of songs that were kept from training, by which it is seen how well they are told."""
 
@@ -54,6 +55,7 @@ def train_stage(
         InputError: data are missing or cannot be used, or the folder holds another training.
         OSError: a file cannot be read or written.
     """
+    check_stage(config)
     clips = _data(config, demonstrations, experts)
     encoder = None
     if config.code == "sdf":
@@ -65,11 +67,16 @@ def train_stage(
     if len(set(clips.song.tolist())) < 2:
         raise InputError("two songs at least are needed, one of them to measure on")
     learned, held = (Windows.of(some, config) for some in clips.split())
-    sample = learned.some(_SCALED_BY)
+    sample = learned.draw(np.random.default_rng(config.fit.seed), _SCALED_BY)
     torch.manual_seed(config.fit.seed)
     stage = Stage(config, {key: value.shape[1:] for key, value in sample.items()}, encoder)
     stage.fit_scales(sample)
-    about = {"stage": name, **dataclasses.asdict(config), "data": clips.fingerprint()}
+    about = {
+        "stage": name,
+        **dataclasses.asdict(config),
+        "data": clips.fingerprint(),
+        "goal_encoder": None if encoder is None else _digest(encoder),
+    }
     out.mkdir(parents=True, exist_ok=True)
     fit(
         out / name,
@@ -92,6 +99,14 @@ def _data(config: StageConfig, demonstrations: Path | None, experts: Sequence[Pa
     if not experts:
         raise InputError("it learns from --experts, data sets that `pianomime teach` makes")
     return expert_clips(experts, HUMAN if config.level == "high" else EXPERT)
+
+
+def _digest(module: torch.nn.Module) -> str:
+    """Tells weights from others."""
+    digest = hashlib.sha256()
+    for weight in module.state_dict().values():
+        digest.update(weight.numpy().tobytes())
+    return digest.hexdigest()[:16]
 
 
 def _measure(held: Windows) -> Callable[[torch.nn.Module], dict[str, float]]:

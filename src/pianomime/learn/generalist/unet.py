@@ -12,9 +12,7 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
-from pianomime.learn.generalist.config import DiffusionConfig
-
-_GROUPS = 8
+from pianomime.learn.generalist.config import GROUPS, DiffusionConfig
 
 
 class TemporalEncoder(nn.Module):
@@ -193,6 +191,6 @@ class _StepEncoding(nn.Module):
 def _convolution(before: int, after: int, kernel: int, frames: int) -> nn.Sequential:
     return nn.Sequential(
         FrameConvolution(before, after, kernel, frames),
-        nn.GroupNorm(_GROUPS, after),
+        nn.GroupNorm(GROUPS, after),
         nn.Mish(),
     )

@@ -32,6 +32,11 @@ class SacConfig:
     seed: int = 0
     """Of everything that is drawn."""
 
+    @property
+    def first(self) -> int:
+        """Frames that are played by chance before anything is learned."""
+        return 10 * self.batch
+
 
 def check_sac(config: SacConfig) -> None:
     """Refuse settings out of range.
@@ -46,3 +51,7 @@ def check_sac(config: SacConfig) -> None:
         above_zero(name, getattr(config, name))
     within("discount", config.discount, 0, 1)
     within("seed", config.seed, 0)
+    for width in config.hidden:
+        within("hidden", width, 1)
+    # Before, actions are by chance, and nothing is learned.
+    within("frames", config.frames, config.first + 1)

@@ -18,6 +18,7 @@ from torch import Tensor, nn
 
 from pianomime.generalist.features import CONTROLS, TIPS, holding, low_inputs
 from pianomime.generalist.horizon import CHUNK
+from pianomime.learn.config_check import within
 from pianomime.learn.generalist.export import export_network
 from pianomime.learn.generalist.scale import Scale
 from pianomime.learn.reward import press_reward
@@ -142,6 +143,7 @@ def train_sac(
         OSError: a file cannot be read or written.
     """
     check_sac(config)
+    within("threads", threads, 0)
     paths = find_songs(folders)
     with stage_folder(out, STAGE, config, paths) as (folder, result):
         if folder.finished and result.exists():
@@ -155,7 +157,7 @@ def train_sac(
             env,
             learning_rate=config.learning_rate,
             buffer_size=config.buffer,
-            learning_starts=10 * config.batch,
+            learning_starts=config.first,
             batch_size=config.batch,
             gamma=config.discount,
             gradient_steps=config.updates,
