@@ -16,7 +16,8 @@ class TrainSac:
     """Train one policy for all songs by reinforcement learning, without demonstrations.
 
     This is the paper's multi-task SAC, a baseline. OUT then holds multi-task-sac.onnx. Set
-    PIANOMIME_WEIGHTS=OUT to play with it. A training that is stopped begins anew.
+    PIANOMIME_WEIGHTS=OUT to play with it. Started again it goes on from its last checkpoint, of
+    which there is one every 50,000 frames, of up to a GB.
 
     Examples:
       pianomime train-sac MIDI_FOLDER

@@ -16,9 +16,10 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 
+from pianomime.learn.boundary import Boundary
 from pianomime.learn.config import PpoConfig
 from pianomime.learn.policy import ACTIVATIONS, PolicyTracker
-from pianomime.learn.ppo_model import Boundary, Ppo, actor_network, torch_threads
+from pianomime.learn.ppo_model import Ppo, actor_network, torch_threads
 from pianomime.learn.run_folder import Evaluation, RunFolder
 from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_vec_env import SongVecEnv

@@ -10,6 +10,7 @@ from pianomime import Player
 from pianomime.errors import InputError
 from pianomime.generalist.methods import WEIGHTS
 from pianomime.generalist.policy import load_network
+from pianomime.learn.fit_folder import FitFolder
 from pianomime.learn.sac import training
 from pianomime.learn.sac.config import SacConfig
 from pianomime.learn.sac.training import STEPS, AskedSong, SacVecEnv, train_sac
@@ -48,6 +49,33 @@ def test_what_was_trained_plays(two_notes, tmp_path, monkeypatch):
     written = made.stat().st_mtime_ns
     train_sac([songs], tmp_path / "out", SMALL, 1)
     assert made.stat().st_mtime_ns == written
+
+
+@pytest.mark.parametrize("buffer", [400, 60])
+def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monkeypatch, buffer):
+    """Also when frames that were played first are forgotten again."""
+    songs, config = tmp_path / "songs", replace(SMALL, buffer=buffer)
+    songs.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+    monkeypatch.setattr(training, "_CHECKPOINT", 50)
+    train_sac([songs], tmp_path / "whole", config, 1)
+    kept = FitFolder.checkpoint
+
+    def stop(self, arrays, steps):
+        kept(self, arrays, steps)
+        if steps == 150:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(FitFolder, "checkpoint", stop)
+    with pytest.raises(KeyboardInterrupt):
+        train_sac([songs], tmp_path / "parts", config, 1)
+    monkeypatch.setattr(FitFolder, "checkpoint", kept)
+    train_sac([songs], tmp_path / "parts", config, 1)
+    one, other = (
+        FitFolder(tmp_path / name / "multi-task-sac").weights()[0] for name in ("whole", "parts")
+    )
+    for name, array in one.items():
+        np.testing.assert_array_equal(array, other[name])
 
 
 def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch):

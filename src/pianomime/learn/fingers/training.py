@@ -13,12 +13,13 @@ from stable_baselines3.common.logger import Logger
 
 from pianomime.generalist.fingers import SIZE, FingerTracker
 from pianomime.generalist.methods import FINGERS
+from pianomime.learn.boundary import Boundary
 from pianomime.learn.config_check import within
 from pianomime.learn.fingers.config import FingersConfig, check_fingers
 from pianomime.learn.fingers.fingers_env import AGENTS, FingersVecEnv, PlannedSong
 from pianomime.learn.fit_folder import FitFolder
 from pianomime.learn.generalist.export import export_network
-from pianomime.learn.ppo_model import Boundary, Ppo, actor_network, torch_threads
+from pianomime.learn.ppo_model import Ppo, actor_network, torch_threads
 from pianomime.learn.run_log import RunLog
 from pianomime.learn.song import load_score
 from pianomime.learn.stage_folder import stage_folder
@@ -53,7 +54,8 @@ def train_fingers(
         preparing: told how many songs are planned.
 
     Returns:
-        The result, and the F1 on the songs that were kept, without and with it.
+        The result, and the F1 on the songs that were kept, without and with it (before the file
+        keeps half of its digits).
 
     Raises:
         InputError: the config or a song cannot be used, or the folder holds another training.

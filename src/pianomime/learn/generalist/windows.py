@@ -91,7 +91,7 @@ class Windows:
         Args:
             rows: (B,) frames.
             octaves: (B,) by how many everything is moved up; where that leads off the keyboard, or
-                beyond what the forearms can reach, it stays.
+                controls beyond what the forearms can reach, it stays.
         """
         return self._relative(self._absolute(rows, octaves))
 

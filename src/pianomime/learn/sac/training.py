@@ -12,13 +12,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from stable_baselines3 import SAC
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
 from pianomime.generalist.features import CONTROLS, TIPS, holding, low_inputs
 from pianomime.generalist.horizon import CHUNK
+from pianomime.learn.boundary import Boundary
 from pianomime.learn.config_check import within
+from pianomime.learn.fit_folder import FitFolder
 from pianomime.learn.generalist.export import export_network
 from pianomime.learn.generalist.scale import Scale
 from pianomime.learn.reward import press_reward
@@ -28,6 +29,7 @@ from pianomime.learn.song import load_score
 from pianomime.learn.songs_vec_env import Played, SongsVecEnv
 from pianomime.learn.stage_folder import stage_folder
 from pianomime.learn.tell import Tell
+from pianomime.learn.tensors import Arrays
 from pianomime.music import Score
 from pianomime.song_files import find_songs
 from pianomime.world.figures import KEYS
@@ -38,6 +40,9 @@ STEPS = by_actuator(finger=0.3, wrist=0.3, slide=0.06)
 """(46,) [rad, m] that an action of 1 sends an actuator away from where it is."""
 _SCALED_BY = 64
 """Frames, in all worlds, from which the scale of what is seen is taken."""
+_CHECKPOINT = 50_000
+"""Frames between checkpoints, about; all that is remembered is in them."""
+_REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 _VECTOR = 108 + KEYS + TIPS
 _HIT = 0.5
 
@@ -126,10 +131,7 @@ def train_sac(
     threads: int = 0,
     tell: Tell | None = None,
 ) -> Path:
-    """Train; the result is `multi-task-sac.onnx` in the folder.
-
-    A training that was interrupted begins anew: what is remembered of the frames played is too much
-    to be written every now and then.
+    """Train, or go on where its training was; the result is `multi-task-sac.onnx` in the folder.
 
     Args:
         folders: of MIDI files.
@@ -150,7 +152,6 @@ def train_sac(
             return result
         songs = [AskedSong.of(load_score(path, 0.0, config.seconds)) for path in paths]
         env = SacVecEnv(songs, config, threads)
-        env.reseed(config.seed)
         scale = env.scale = _scale(env, config.seed)
         model = SAC(
             "MlpPolicy",
@@ -166,8 +167,18 @@ def train_sac(
             device="cpu",
         )
         model.set_logger(Logger(None, []))
-        with closing(RunLog(folder.tensorboard, 1)) as log:
-            model.learn(config.frames, callback=_Told(config, log, tell))
+        state = folder.state()
+        since = 1 if state is None else state[1] + 1
+        with closing(RunLog(folder.tensorboard, since)) as log:
+            boundary = _Boundary(folder, env, config, log, tell)
+            boundary.init_callback(model)
+            if state is not None:
+                boundary.resume(*state, folder.path)
+            model.learn(
+                config.frames - model.num_timesteps,
+                callback=boundary,
+                reset_num_timesteps=state is None,
+            )
         actor = _Actor(scale, model.policy.actor).eval()
         about = {
             "stage": STAGE,
@@ -184,13 +195,75 @@ def train_sac(
     return result
 
 
-class _Told(BaseCallback):
-    """Tells how far it is, and how much reward there was."""
+class _Boundary(Boundary):
+    """Tells how far it is and how much reward there was, and writes a checkpoint now and then."""
 
-    def __init__(self, config: SacConfig, log: RunLog, tell: Tell | None) -> None:
-        super().__init__()
-        self._config, self._log, self._tell = config, log, tell
+    def __init__(
+        self,
+        folder: FitFolder,
+        env: SacVecEnv,
+        config: SacConfig,
+        log: RunLog,
+        tell: Tell | None,
+    ) -> None:
+        # Whole frames of all worlds.
+        super().__init__(env, config.seed, -(-_CHECKPOINT // config.worlds) * config.worlds)
+        self._folder, self._config = folder, config
+        self._log, self._tell = log, tell
         self._rewards: list[float] = []
+
+    @property
+    def _learner(self) -> SAC:
+        assert isinstance(self.model, SAC)
+        return self.model
+
+    def arrays(self) -> Arrays:
+        """As `Boundary.arrays`, with all frames that are remembered."""
+        model, kept = self._learner, self._learner.replay_buffer
+        assert kept is not None
+        assert model.log_ent_coef is not None
+        arrays = super().arrays()
+        for name in _REMEMBERED:
+            whole = getattr(kept, name)
+            arrays[f"buffer/{name}"] = whole if kept.full else whole[: kept.pos]
+        return arrays | {
+            "buffer/next": np.array(kept.pos),
+            "temperature/log": model.log_ent_coef.detach().numpy(),
+        }
+
+    def optimizers(self) -> dict[str, torch.optim.Optimizer]:
+        """As `Boundary.optimizers`."""
+        model = self._learner
+        assert model.ent_coef_optimizer is not None
+        return {
+            "actor": model.actor.optimizer,
+            "critic": model.critic.optimizer,
+            "entropy": model.ent_coef_optimizer,
+        }
+
+    def resume(self, arrays: Arrays, steps: int, path: Path) -> None:
+        """As `Boundary.resume`."""
+        super().resume(arrays, steps, path)
+        model, kept = self._learner, self._learner.replay_buffer
+        assert kept is not None
+        assert model.log_ent_coef is not None
+        for name in _REMEMBERED:
+            rows = arrays[f"buffer/{name}"]
+            getattr(kept, name)[: len(rows)] = rows
+        kept.pos = int(arrays["buffer/next"])
+        kept.full = len(rows) == kept.buffer_size
+        model.log_ent_coef.data.copy_(torch.from_numpy(arrays["temperature/log"]))
+
+    def keep(self, update: int, steps: int) -> None:
+        """As `Boundary.keep`."""
+        self._rewards = []
+        if update:
+            self._folder.checkpoint(self.arrays(), steps)
+
+    def _on_rollout_start(self) -> None:
+        # For SAC every frame is a rollout of its own.
+        if self.model.num_timesteps % self._steps_per_update == 0:
+            self.between_updates()
 
     def _on_step(self) -> bool:
         self._rewards.append(float(self.locals["rewards"].mean()))
