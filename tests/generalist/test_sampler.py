@@ -65,3 +65,20 @@ def test_a_network_that_knows_the_answer_is_believed():
             np.random.default_rng(),
         )
         np.testing.assert_allclose(found, truth, atol=1e-6)
+
+
+@pytest.mark.parametrize("prediction", ["epsilon", "sample"])
+def test_more_steps_than_the_diffusion_has_are_as_many(prediction):
+    few = 10
+    asked = []
+
+    def heard(noisy, step):
+        asked.append(int(step[0]))
+        return network(noisy, step)
+
+    most, all_of_them = (
+        take_noise_off(heard, NOISE, few, prediction, Sampler(steps), np.random.default_rng())
+        for steps in (100, few)
+    )
+    np.testing.assert_array_equal(most, all_of_them)
+    assert asked == [*range(few - 1, -1, -1)] * 2

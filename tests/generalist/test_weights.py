@@ -28,6 +28,19 @@ def test_they_are_small() -> None:
     assert (weights_folder() / "README.md").is_file()
 
 
+def test_fingers_add_something() -> None:
+    """To what the zero-shot player makes of songs that it did not learn from."""
+    some = [
+        excerpt(Score.from_midi(songs.path(name)), seconds=12)
+        for name in ("beethoven-ode-to-joy", "petzold-minuet-g", "satie-gymnopedie-1")
+    ]
+    with_it, without = (
+        np.mean([Player.from_name(name, 0).play(one).metrics()["f1"] for one in some])
+        for name in ("fingers", "zero-shot")
+    )
+    assert with_it > without
+
+
 @pytest.mark.parametrize(
     ("name", "least"), [("fingers", 0.85), ("two-stage-diff", 0.3), ("two-stage-mse", 0.3)]
 )

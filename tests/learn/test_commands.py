@@ -88,7 +88,13 @@ def test_without_the_extra_it_says_what_to_install() -> None:
         "from pianomime.cli import main\n"
         "main(sys.argv[1:])\n"
     )
-    for arguments in (["train-expert", "demo.npz"], ["collect", "run"]):
+    for arguments in (
+        ["train-expert", "demo.npz"],
+        ["collect", "run"],
+        ["teach", "demo.npz"],
+        ["train", "bc-mse", "--experts", "some.zarr"],
+        *([name, "songs"] for name in ("train-goal", "train-sac", "train-fingers")),
+    ):
         done = subprocess.run(
             [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=False
         )

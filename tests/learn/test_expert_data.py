@@ -13,7 +13,7 @@ import zarr
 from pianomime.commands.collect import Collect
 from pianomime.errors import InputError
 from pianomime.learn.config import ExpertConfig
-from pianomime.learn.episode import COLUMNS, published_episodes, world_order
+from pianomime.learn.episode import COLUMNS, Episode, published_episodes, world_order
 from pianomime.learn.expert import load_expert, train_expert
 from pianomime.learn.expert_data import ExpertData, write_expert_data
 from pianomime.learn.run_folder import find_runs
@@ -27,7 +27,7 @@ def runs(
     two_notes: Demonstration, tmp_path: Path, small_ppo: ExpertConfig, small_search: ExpertConfig
 ) -> Path:
     """A run of each method in one folder, and one that was not begun."""
-    two_notes.save(tmp_path / "demo.npz")
+    dataclasses.replace(two_notes, song=42, split="test").save(tmp_path / "demo.npz")
     for name, config in (("a", small_ppo), ("b", small_search)):
         short = dataclasses.replace(config, steps=128)
         train_expert(tmp_path / "demo.npz", tmp_path / "runs" / name, short, threads=1)
@@ -53,6 +53,7 @@ def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
         np.testing.assert_allclose(columns["joints"][1:], performance.qpos[:-1, 88:], atol=1e-6)
         np.testing.assert_allclose(columns["keys"][1:], performance.key_state[:-1], atol=1e-6)
         np.testing.assert_array_equal(columns["goal"], run.song.score.roll())
+        assert (episode.song, episode.split) == (42, "test")
 
 
 def test_it_reads_in_a_few_lines(runs: Path, tmp_path: Path) -> None:
@@ -142,7 +143,12 @@ def test_published_experts_come_into_the_same_form(tmp_path: Path) -> None:
     out = tmp_path / "experts.zarr"
     Collect((tmp_path / "experts.npz",), out, tmp_path / "demonstrations.npz").run()
     episode = ExpertData.open(out).episode(0)
-    assert episode.name == "clip007"
+    assert (episode.name, episode.song, episode.split) == ("clip007", -1, "train")
+    with np.load(tmp_path / "demonstrations.npz") as file:
+        marks = {"song_group": [4, 9], "split": ["train", "train"], "odd": [False, True]}
+        np.savez(tmp_path / "marked.npz", **file, **marks)
+    marked, _ = next(published_episodes(tmp_path / "experts.npz", tmp_path / "marked.npz"))
+    assert (marked.song, marked.split) == (9, "odd")
     columns = episode.columns
     # A row's keys are answered by the next row's; goal and tips are those of its own clip.
     np.testing.assert_array_equal(columns["pressed"][:, 40], [0, 0, 1, 1, 0, 0])
@@ -154,6 +160,19 @@ def test_published_experts_come_into_the_same_form(tmp_path: Path) -> None:
     assert columns["joints"][0, 27 + 3] == pytest.approx(joints[0, 0], abs=1e-4)
     assert model.joint(88).name == "rh_forearm_tx"
     assert model.joint(88 + 27 + 3).name == "lh_WRJ2"
+
+
+def test_a_damaged_data_set_is_one_line(two_notes: Demonstration, tmp_path: Path) -> None:
+    columns = {name: np.ones((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    out = tmp_path / "experts.zarr"
+    write_expert_data(out, iter([Episode("one", 0.0, "ik", columns)]))
+    chunk = next(file for file in (out / "joints" / "c").rglob("*") if file.is_file())
+    chunk.write_bytes(chunk.read_bytes()[: chunk.stat().st_size // 2])
+    with pytest.raises(InputError, match="damaged"):
+        ExpertData.open(out).episode(0)
+    zarr.open_group(str(out)).attrs["episodes"] = []
+    with pytest.raises(InputError, match="damaged"):
+        ExpertData.open(out)
 
 
 def test_published_files_of_another_shape(tmp_path: Path) -> None:

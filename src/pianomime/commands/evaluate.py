@@ -29,7 +29,8 @@ class Evaluate:
     """Name of the player."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
     """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
-    On two cores 1 takes about as long as the music or less, 2 and 3 several times longer."""
+    On two cores 1 takes about as long as the music or less, 2 and 3 several times longer. For
+    players that imitate it is 2, 5, 20 or 100 steps of a diffusion."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much of each song to play at most, from its first note [s]."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None

@@ -27,6 +27,7 @@ class Teach:
 
     Examples:
       pianomime teach demonstrations.npz -o lessons.zarr
+      pianomime train high-diff --experts lessons.zarr -o first --goal out/generalist/goal
       pianomime train low-diff --experts lessons.zarr -o first --goal out/generalist/goal
       pianomime teach demonstrations.npz --pilot first/low-diff.onnx \
         --planner first/high-diff.onnx -o more.zarr

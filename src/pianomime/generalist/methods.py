@@ -59,8 +59,9 @@ def make_generalist(method: str, effort: int, seed: int = 0) -> Generalist:
 
     *high, low = METHODS[method]
     sampler = Sampler(*_SAMPLERS[effort])
-    follower = load_follower(stage_path(low), sampler, seed)
-    return Generalist(follower, load_policy(stage_path(high[0]), sampler) if high else None, seed)
+    follower = load_follower(stage_path(low), sampler, seed, low)
+    wanting = load_policy(stage_path(high[0]), sampler, high[0]) if high else None
+    return Generalist(follower, wanting, seed)
 
 
 def make_fingers() -> FingerTracker:
@@ -72,7 +73,7 @@ def make_fingers() -> FingerTracker:
     from pianomime.generalist.fingers import FingerTracker
     from pianomime.generalist.policy import load_network
 
-    return FingerTracker(load_network(stage_path(FINGERS))[0])
+    return FingerTracker(load_network(stage_path(FINGERS), FINGERS)[0])
 
 
 def weight_files(player: str) -> list[Path]:
@@ -85,16 +86,24 @@ def weight_files(player: str) -> list[Path]:
     return [stage_path(stage) for stage in stages]
 
 
-def load_follower(path: Path, sampler: Sampler | None = None, seed: int = 0) -> Follower:
+def load_follower(
+    path: Path, sampler: Sampler | None = None, seed: int = 0, stage: str = ""
+) -> Follower:
     """The tracker of a file of a low level, or of a policy of one stage.
 
+    Args:
+        path: of the file.
+        sampler: how a diffusion is run.
+        seed: of what is drawn.
+        stage: that the file must hold; any if not given.
+
     Raises:
-        InputError: it is damaged, or says something else than controls.
+        InputError: it is damaged, or holds another stage, or says something else than controls.
     """
     from pianomime.generalist.follower import Follower
     from pianomime.generalist.policy import load_policy
 
-    policy = load_policy(path, sampler)
+    policy = load_policy(path, sampler, stage)
     if policy.about["level"] not in ("low", "whole"):
         raise InputError(f"{path}: not a stage that says controls")
     return Follower(policy, seed, policy.about["level"] == "low", policy.about["prior"])

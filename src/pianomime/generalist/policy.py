@@ -73,22 +73,31 @@ class StagePolicy:
         return relative
 
 
-def load_policy(path: Path, sampler: Sampler | None = None) -> StagePolicy:
+def load_policy(path: Path, sampler: Sampler | None = None, stage: str = "") -> StagePolicy:
     """A stage that was exported, run by ONNX Runtime.
+
+    Args:
+        path: of the file.
+        sampler: how a diffusion is run.
+        stage: as `load_network`.
 
     Raises:
         InputError: as `load_network`.
     """
-    run, about = load_network(path)
+    run, about = load_network(path, stage)
     return StagePolicy(run, about, sampler or Sampler())
 
 
-def load_network(path: Path) -> tuple[Run, dict[str, Any]]:
+def load_network(path: Path, stage: str = "") -> tuple[Run, dict[str, Any]]:
     """A network that was exported: what runs it, and what it tells of itself.
 
+    Args:
+        path: of the file.
+        stage: that it must hold; any if not given.
+
     Raises:
-        InputError: there is no such file, it is damaged or of another version, or ONNX Runtime is
-            not installed.
+        InputError: there is no such file, it is damaged, of another version or of another stage, or
+            ONNX Runtime is not installed.
     """
     try:
         import onnxruntime
@@ -113,4 +122,6 @@ def load_network(path: Path) -> tuple[Run, dict[str, Any]]:
         raise InputError(f"{path}: damaged, or not a stage of a player") from error
     if not known:
         raise InputError(f"{path}: a stage of another version than this program's")
+    if stage not in ("", about["stage"]):
+        raise InputError(f"{path}: holds the stage {about['stage']}, not {stage}")
     return lambda given: session.run(None, given), about

@@ -23,7 +23,7 @@ class Sampler:
     """How a diffusion is run: the same weights allow all."""
 
     steps: int = 10
-    """Calls of the network."""
+    """Calls of the network, as many as the diffusion has steps at most."""
     eta: float = 0.0
     """Noise that is added on the way: 0 is DDIM; 1 with all steps is DDPM, as in the paper."""
 
@@ -61,8 +61,8 @@ def take_noise_off(
     """
     left = signal(steps)
     x = noise.astype(np.float64)
-    calls = np.arange(sampler.steps)
-    times = np.round(steps - calls * steps / sampler.steps).astype(np.int64) - 1
+    number = min(sampler.steps, steps)
+    times = np.round(steps - np.arange(number) * steps / number).astype(np.int64) - 1
     for now, after in zip(times, [*times[1:], -1], strict=True):
         said = denoise(x.astype(np.float32), np.full(len(x), now, np.int64))
         here, there = left[now], left[after] if after >= 0 else 1.0

@@ -18,6 +18,7 @@ from pianomime.learn.song_batch import prior_tracker
 from pianomime.music import frame_metrics
 from pianomime.plan import NO_KEY, FingertipPlan
 from pianomime.track import IkTracker, PedalTracker
+from pianomime.video.published import songs_and_splits
 from pianomime.world import World
 from pianomime.world.figures import HAND_JOINTS, KEYS, key_travel
 from pianomime.world.moment import PRESSED_WITHIN
@@ -103,7 +104,8 @@ def play_episode(run: RunFolder) -> Episode:
         world.step(ctrl, bool(pedal[frame]))
         columns["pressed"][frame] = world.pressed
     f1 = fill_columns(columns, goal, plan.fingertips, plan.finger_key)
-    return Episode(run.song.score.title, f1, run.config.env.prior, columns)
+    song = run.song
+    return Episode(song.score.title, f1, run.config.env.prior, columns, song.song, song.split)
 
 
 def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Episode, int]]:
@@ -112,14 +114,14 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
     Args:
         experts: .npz with clip_id, length, qpos_1e4, qvel_500, key_state_255 and ctrl_1e4.
         demonstrations: .npz with clip_id, length, fingertips, finger_key and goal_packed of the
-            same clips, and more; where it has song_group and split, they are kept.
+            same clips, and more; where it has song_group, split and odd, they are kept.
 
     Raises:
         InputError: the files are not what they should be.
     """
     recorded = _arrays(experts, "clip_id length qpos_1e4 qvel_500 key_state_255 ctrl_1e4")
     human = _arrays(
-        demonstrations, "clip_id length fingertips finger_key goal_packed", "song_group split"
+        demonstrations, "clip_id length fingertips finger_key goal_packed", "song_group split odd"
     )
     for path, arrays, column in (
         (experts, recorded, "ctrl_1e4"),
@@ -130,8 +132,7 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
             raise InputError(f"{path}: the lengths of the clips do not add up")
     place = {clip: row for row, clip in enumerate(human["clip_id"].tolist())}
     human_ends = np.cumsum(human["length"])
-    song = human.get("song_group", np.full(len(place), -1))
-    split = human.get("split", np.full(len(place), "train"))
+    song, split = songs_and_splits(demonstrations, human, len(place))
     ends = np.cumsum(recorded["length"])
     for clip, end, length in zip(
         recorded["clip_id"].tolist(), ends, recorded["length"], strict=True
@@ -157,8 +158,8 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         goal = np.unpackbits(human["goal_packed"][theirs], axis=1)[:, :KEYS].astype(bool)
         f1 = fill_columns(columns, goal, tips, finger_key)
         name = f"clip{clip:03d}"
-        of_song, part = int(song[place[clip]]), str(split[place[clip]])
-        yield Episode(name, f1, "ik", columns, of_song, part), len(ends)
+        row = place[clip]
+        yield Episode(name, f1, "ik", columns, song[row], split[row]), len(ends)
 
 
 def world_order(recorded: NDArray[np.float64]) -> NDArray[np.float64]:

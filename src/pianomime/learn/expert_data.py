@@ -130,22 +130,36 @@ class ExpertData:
             )
         if "episode_end" not in group:
             raise InputError(f"{path}: has no episode_end")
-        ends = np.asarray(_array(group, "episode_end")[:])
+        try:
+            ends = np.asarray(_array(group, "episode_end")[:])
+        except (RuntimeError, ValueError, OSError) as error:
+            raise InputError(f"{path}: damaged ({error})") from error
         for name, column in COLUMNS.items():
             if name not in group or _array(group, name).shape != (int(ends[-1]), *column.shape):
                 raise InputError(f"{path}: {name} is missing or has another shape")
-        episodes: Any = group.attrs["episodes"]
-        return cls(group, ends, list(episodes))
+        episodes: Any = group.attrs.get("episodes")
+        rising = len(ends) > 0 and bool((np.diff(ends, prepend=0) > 0).all())
+        if not isinstance(episodes, list) or len(episodes) != len(ends) or not rising:
+            raise InputError(f"{path}: damaged, its episodes do not fit episode_end")
+        return cls(group, ends, episodes)
 
     def __len__(self) -> int:
         """Number of episodes."""
         return len(self.ends)
 
     def columns(self, number: int, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-        """Some columns of one episode, in memory."""
+        """Some columns of one episode, in memory.
+
+        Raises:
+            InputError: they are damaged.
+        """
         first = int(self.ends[number - 1]) if number else 0
         rows = slice(first, int(self.ends[number]))
-        return {name: np.asarray(_array(self.group, name)[rows]) for name in names}
+        try:
+            return {name: np.asarray(_array(self.group, name)[rows]) for name in names}
+        # A damaged store raises what its codecs happen to raise.
+        except (RuntimeError, ValueError, OSError) as error:
+            raise InputError(f"{self.group.store_path}: damaged ({error})") from error
 
     def episode(self, number: int) -> Episode:
         """One episode, in memory."""

@@ -66,7 +66,8 @@ def fit(
 
     Args:
         folder: made if need be.
-        module: the network as it begins. It is the result when this returns, in eval mode.
+        module: the network as it begins. It is the result when this returns, on the processor, in
+            eval mode.
         loss: what to make small.
         draw: what to learn from.
         config: how to train.
@@ -96,7 +97,8 @@ def fit(
             learner = _Learner(module, config, accelerator)
             _train(there, learner, loss, draw, evaluate, tell)
             accelerator.wait_for_everyone()
-    load_weights(folder, module)
+    # From the device where it was trained: what comes next has no need of one.
+    load_weights(folder, module.to("cpu"))
 
 
 def load_weights(folder: Path, module: nn.Module) -> None:
@@ -217,10 +219,13 @@ class _Learner:
         parts: dict[str, Arrays] = {"module": {}, "average": {}, "adam": {}}
         for name, array in arrays.items():
             part, _, rest = name.partition("/")
-            parts[part][rest] = array
+            parts.setdefault(part, {})[rest] = array
         load_arrays(self.module, parts["module"], path)
         self.step = step
-        average = [torch.tensor(parts["average"][str(i)]) for i in range(len(self._parameters))]
+        averages = parts["average"]
+        if len(averages) != len(self._parameters):
+            raise InputError(f"{path}: the checkpoint does not fit the config")
+        average = [torch.tensor(averages[str(index)]) for index in range(len(averages))]
         self._average.load_state_dict({"optimization_step": step, "shadow_params": average})
         self._average.to(self._device)
         known = self._optimizer.state_dict()
@@ -245,11 +250,13 @@ def _train(
         learner.resume(*state, folder.path)
     since: list[Tensor] = []
     looked = saved = time.monotonic()
+    waited = 0.0
     with ExitStack() as stack:
         log = None
         if learner.main:
             log = stack.enter_context(closing(RunLog(folder.tensorboard, learner.step + 1)))
-        for drawn in stack.enter_context(closing(_batches(draw, config, learner.step))):
+        for drawn, asked in stack.enter_context(closing(_batches(draw, config, learner.step))):
+            waited += time.monotonic() - asked
             since.append(learner.update(loss, drawn))
             now, last = time.monotonic(), learner.step == config.steps
             save = last or now - saved > config.checkpoint_seconds
@@ -258,8 +265,8 @@ def _train(
             if not (save or measure or now - looked > _PAUSE):
                 continue
             # Before anything is kept.
-            figures = _look(since, learner.step)
-            since, looked = [], now
+            figures = _look(since, learner.step) | {"fit/waited": waited / max(now - looked, 1e-9)}
+            since, looked, waited = [], now, 0.0
             if log is None:
                 continue
             log.add(learner.step, figures)
@@ -279,8 +286,11 @@ def _train(
 
 def _batches(
     draw: Draw, config: FitConfig, first: int
-) -> Generator[Mapping[str, NDArray[Any]], None, None]:
-    """The batch of each step from the first on, drawn while the one before is learned from."""
+) -> Generator[tuple[Mapping[str, NDArray[Any]], float], None, None]:
+    """The batch of each step from the first on, drawn while the one before is learned from.
+
+    With each the time at which it was asked for.
+    """
 
     def drawn(step: int) -> Mapping[str, NDArray[Any]]:
         return draw(np.random.default_rng([config.seed, step]), config.batch)
@@ -288,10 +298,11 @@ def _batches(
     with ThreadPoolExecutor(1) as thread:
         coming: deque[Future[Mapping[str, NDArray[Any]]]] = deque()
         for step in range(first, config.steps + 1):
+            asked = time.monotonic()
             if step < config.steps:
                 coming.append(thread.submit(drawn, step))
             if step > first:
-                yield coming.popleft().result()
+                yield coming.popleft().result(), asked
 
 
 def _look(since: list[Tensor], step: int) -> dict[str, float]:

@@ -99,6 +99,8 @@ class FitFolder:
         if not (self.path / _STATE).exists():
             return None
         arrays, about = read_tensors(self.path / _STATE)
+        if "steps" not in about:
+            raise InputError(f"{self.path / _STATE}: not a checkpoint of a training")
         return arrays, int(about["steps"])
 
     def checkpoint(self, arrays: Arrays, steps: int) -> None:

@@ -64,6 +64,31 @@ def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demo
         yield replace(made, song=clip.song, split=clip.split), total
 
 
+def songs_and_splits(
+    path: Path, arrays: dict[str, NDArray[Any]], clips: int
+) -> tuple[list[int], list[str]]:
+    """The song and the split of each clip, as far as a file of clips tells them.
+
+    Args:
+        path: of the file.
+        arrays: `song_group`, `split` and `odd` of each clip, where it has them.
+        clips: how many there are.
+
+    Raises:
+        InputError: they are of another kind or number.
+    """
+    song = arrays.get("song_group", np.full(clips, -1))
+    split = arrays.get("split", np.full(clips, TRAIN))
+    odd = arrays.get("odd", np.zeros(clips, bool))
+    kinds = (song.dtype.kind in "iu", split.dtype.kind == "U", odd.dtype == bool)
+    if not all(kinds) or not song.shape == split.shape == odd.shape == (clips,):
+        raise InputError(
+            f"{path}: song_group, split and odd must be whole numbers, texts and booleans, "
+            "one a clip"
+        )
+    return song.tolist(), np.where(odd, _ODD, split).tolist()
+
+
 def demonstration_of(
     fingertips: NDArray[np.float64], goal: NDArray[np.bool_] | None, title: str, source: str
 ) -> Demonstration:
@@ -195,22 +220,14 @@ def _npz(path: Path) -> list[_Clip]:
         raise InputError(f"{path}: the lengths of the clips must be whole numbers from 1 on")
     if int(length.sum()) != len(tips):
         raise InputError(f"{path}: the lengths of the clips do not add up to {len(tips)} frames")
-    song = arrays.get("song_group", np.full(len(length), -1))
-    split = arrays.get("split", np.full(len(length), TRAIN))
-    odd = arrays.get("odd", np.zeros(len(length), bool))
-    kinds = (song.dtype.kind in "iu", split.dtype.kind == "U", odd.dtype == bool)
-    if not all(kinds) or not len(song) == len(split) == len(odd) == len(length):
-        raise InputError(
-            f"{path}: song_group, split and odd must be whole numbers, texts and booleans, "
-            "one a clip"
-        )
+    song, split = songs_and_splits(path, arrays, len(length))
     ends = np.cumsum(length)
     return [
         _Clip(
             tips[end - frames : end],
             None if goal is None else goal[end - frames : end],
-            int(song[clip]),
-            _ODD if odd[clip] else str(split[clip]),
+            song[clip],
+            split[clip],
         )
         for clip, (end, frames) in enumerate(zip(ends, length, strict=True))
     ]

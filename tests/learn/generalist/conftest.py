@@ -9,7 +9,7 @@ from pianomime.generalist.features import rest_tips
 from pianomime.learn.generalist.clips import Clips
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def clips() -> Clips:
     """Three clips of 30, 7 and 20 frames, the first two of one song; every frame is another."""
     draw = np.random.default_rng(0)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 import torch
 
+from pianomime import Player
 from pianomime.errors import InputError
 from pianomime.generalist.features import base
+from pianomime.generalist.methods import WEIGHTS
 from pianomime.generalist.policy import load_policy
 from pianomime.generalist.sampler import Sampler
 from pianomime.learn.generalist.config import STAGES, DiffusionConfig, check_stage, stage_config
@@ -68,6 +70,15 @@ def test_the_papers_size_has_as_many_parameters_as_table_7_makes(clips, name):
     assert stage.parameters_learned == pytest.approx(by_hand(stage), rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("name", "millions"), [("high-diff", 74.97), ("low-diff", 72.30), ("low-diff-res", 72.96)]
+)
+def test_with_codes_of_goals_it_has_as_many_as_the_results_say(clips, name, millions):
+    with torch.device("meta"):
+        stage, _ = a_stage(clips, name, "paper", GoalEncoder())
+    assert stage.parameters_learned / 1e6 == pytest.approx(millions, abs=0.01)
+
+
 @pytest.mark.parametrize("name", ["high-bet", "low-bet"])
 def test_so_has_a_transformer_as_table_8_makes(clips, name):
     with torch.device("meta"):
@@ -112,12 +123,16 @@ def test_the_configs_that_there_are_can_be_trained(name, size):
         ("low-bet", "bet", {"bins": 1}),
         ("bc-mse", "mlp", {"hidden": (64, 0)}),
         ("bc-mse", "fit", {"steps": 0}),
+        # What would do nothing.
+        ("high-diff", None, {"target_noise": 0.1}),
+        ("low-diff", None, {"hand_noise": 0.1}),
+        ("high-diff", "bet", {"layers": 2}),
     ],
 )
 def test_settings_that_do_not_fit_are_refused(name, part, change):
     config = stage_config(name)
     changed = change if part is None else {part: replace(getattr(config, part), **change)}
-    with pytest.raises(InputError, match=r"must|levels"):
+    with pytest.raises(InputError, match=r"must|levels|does nothing"):
         check_stage(replace(config, **changed))
 
 
@@ -250,6 +265,16 @@ def test_a_file_that_is_no_stage_is_refused(clips, tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(InputError, match="damaged"):
         load_policy(path)
+
+
+def test_another_stage_under_its_name_is_refused(clips, tmp_path, monkeypatch):
+    monkeypatch.setenv(WEIGHTS, str(tmp_path))
+    stage, _ = a_stage(clips, "low-diff", diffusion=TINY)
+    for name in ("high-diff", "low-diff", "bc-mse", "fingers"):
+        export_stage(stage, "low-diff", tmp_path / f"{name}.onnx")
+    for player in ("two-stage-diff", "bc-mse", "fingers"):
+        with pytest.raises(InputError, match="holds the stage low-diff"):
+            Player.from_name(player)
 
 
 def test_a_file_that_is_not_there(tmp_path):

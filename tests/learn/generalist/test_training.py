@@ -53,7 +53,8 @@ def data(two_notes: Demonstration, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def train(name, data, out, **changes):
     config = replace(stage_config(name), diffusion=TINY, fit=SHORT, **changes)
-    return train_stage(name, config, out, data / "demos", [data / "experts.zarr"], data / "goal")
+    demos, experts = (data / "demos", []) if "high" in name else (None, [data / "experts.zarr"])
+    return train_stage(name, config, out, demos, experts, data / "goal")
 
 
 @pytest.mark.parametrize("low", ["low-diff", "low-diff-res"])
@@ -105,6 +106,9 @@ def test_what_is_missing_is_named(data, tmp_path):
         train_stage("high-diff", config, tmp_path, None, [], None)
     with pytest.raises(InputError, match="--experts"):
         train_stage("low-diff", stage_config("low-diff"), tmp_path, None, [], None)
+    for stage, experts in (("low-diff", []), ("high-diff", [data / "experts.zarr"])):
+        with pytest.raises(InputError, match="for high levels"):
+            train_stage(stage, stage_config(stage), tmp_path, data / "demos", experts, None)
     with pytest.raises(InputError, match="does not exist"):
         train_stage("high-diff", config, tmp_path, data / "demos", [], tmp_path / "none")
     (tmp_path / "alone").mkdir()
@@ -114,6 +118,17 @@ def test_what_is_missing_is_named(data, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="nothing to train on"):
         train_stage("high-diff", config, tmp_path, tmp_path / "empty", [], None)
+
+
+def test_experts_of_another_prior_are_refused(data, tmp_path):
+    columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    episodes = (Episode(f"{number}", 0.0, "dynamic", columns, number) for number in range(3))
+    write_expert_data(tmp_path / "other.zarr", episodes)
+    config = replace(stage_config("low-diff-res"), diffusion=TINY, fit=SHORT)
+    with pytest.raises(InputError, match="prior dynamic"):
+        train_stage(
+            "low-diff-res", config, tmp_path, None, [tmp_path / "other.zarr"], data / "goal"
+        )
 
 
 def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):

@@ -80,8 +80,51 @@ def test_what_would_leave_the_keyboard_stays(clips):
     clips.columns["goal"][10, 5] = True
     made = windows(clips, "high-diff")
     sample = made.sample(np.array([10]), np.array([-1]))
-    clips.columns["goal"][10, 5] = False
     assert sample["goal"][0, 0, 5]
+
+
+@pytest.mark.parametrize("stage", ["low-diff", "low-diff-res", "bc-mse"])
+def test_beyond_a_clip_its_last_controls_are_held(clips, stage):
+    made = windows(clips, stage)
+    sample = made.sample(np.array([28, 36]), np.zeros(2, int))
+    goal = sample["goal"]
+    np.testing.assert_array_equal(goal[0, :2], clips.columns["goal"][28:30])
+    assert not goal[0, 2:].any()
+    assert not goal[1, 1:].any()
+    last = clips.columns["action"] - (clips.columns["prior"] if made.config.prior else 0.0)
+    told = said(made, sample)
+    np.testing.assert_allclose(
+        told[:, -1], last[[29, 36] if told.shape[1] > 1 else [28, 36]], atol=1e-6
+    )
+    if made.config.level == "low":
+        targets = sample["frames"].reshape(2, 4, 2, 2, 6, 3)[:, -1, 0]
+        np.testing.assert_allclose(targets, clips.columns["fingertips"][[29, 36]], atol=1e-6)
+
+
+def test_what_forearms_cannot_reach_stays(clips):
+    """A control that is at its end already."""
+    clips.columns["action"][5, [20, 43]] = [0.6, 0.0]
+    made = windows(clips, "low-diff")
+    moved = made.sample(np.array([5, 6]), np.ones(2, int))["goal"]
+    still = made.sample(np.array([5, 6]), np.zeros(2, int))["goal"]
+    np.testing.assert_array_equal(moved[0], still[0])
+    assert not np.array_equal(moved[1], still[1])
+
+
+def test_priors_and_fingertips_move_by_an_octave_too(clips):
+    rows = np.array([5, 45])
+    made = windows(clips, "low-diff-res")
+    here, up = (made.sample(rows, np.full(2, by)) for by in (0, 1))
+    np.testing.assert_allclose(here["target"], up["target"], atol=1e-5)
+    prior = (up["vector"] - here["vector"])[:, -46:]
+    np.testing.assert_allclose(prior[:, [20, 43]], octave(), atol=1e-5)
+    np.testing.assert_allclose(np.delete(prior, [20, 43], axis=1), 0, atol=1e-6)
+    made = windows(clips, "high-diff")
+    here, up = (
+        to_world(said(made, made.sample(rows, np.full(2, by))).reshape(2, 4, 2, 6, 3))
+        for by in (0, 1)
+    )
+    np.testing.assert_allclose(up - here, np.broadcast_to([0, octave(), 0], here.shape), atol=1e-5)
 
 
 @pytest.mark.parametrize("stage", STAGES)

@@ -118,6 +118,14 @@ def test_it_learns_where_keys_are(folder, tmp_path):
     assert after.error_mm < 0.5 * before.error_mm
 
 
+def test_too_few_goals_to_measure_on_are_told_at_once(tmp_path):
+    for key in range(3):
+        Score([40 + key], [0.0], [0.5], [80]).to_midi(tmp_path / f"{key}.mid")
+    with pytest.raises(InputError, match="too few"):
+        train_goal([tmp_path], tmp_path / "goal", GoalConfig(), quiet, quiet)
+    assert not (tmp_path / "goal").exists()
+
+
 def test_the_same_seed_learns_the_same(folder, tmp_path):
     def codes(name, seed):
         fit = FitConfig(steps=5, batch=16, warmup=1, seed=seed, bfloat16=False)

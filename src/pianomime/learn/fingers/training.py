@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -63,7 +64,9 @@ def train_fingers(
     """
     check_fingers(config)
     within("threads", threads, 0)
-    paths = find_songs(folders)
+    # Each content once, by its digest: which are kept hardly depends on what else there is.
+    contents = {hashlib.sha256(path.read_bytes()).hexdigest(): path for path in find_songs(folders)}
+    paths = [contents[digest] for digest in sorted(contents)]
     within("number of songs", len(paths), _MEASURED + 1)
     with stage_folder(out, FINGERS, config, paths) as (folder, result):
         if folder.finished and result.exists():
@@ -73,8 +76,7 @@ def train_fingers(
             songs.append(PlannedSong.of(load_score(song, 0.0, config.seconds)))
             if preparing is not None:
                 preparing(done, len(paths), "")
-        held = np.linspace(0, len(songs) - 1, _MEASURED).astype(int).tolist()
-        learned = [song for number, song in enumerate(songs) if number not in held]
+        held, learned = songs[:_MEASURED], songs[_MEASURED:]
         env = FingersVecEnv(learned, config, threads)
         model = _model(env, config)
         model.threads = threads or torch.get_num_threads()
@@ -92,11 +94,11 @@ def train_fingers(
                 reset_num_timesteps=state is None,
             )
         network = actor_network(model).eval()
-        told = {"stage": FINGERS, "level": "fingers"}
-        export_network(network, (torch.zeros(2, SIZE),), ["told"], ["said"], told, result)
-        measured = _measure([songs[number] for number in held], network)
+        measured = _measure(held, network)
         weights = {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}
         folder.finish(weights, measured)
+        told = {"stage": FINGERS, "level": "fingers"}
+        export_network(network, (torch.zeros(2, SIZE),), ["told"], ["said"], told, result)
     return result, measured
 
 

@@ -63,7 +63,8 @@ class Clips:
 
     def fingerprint(self) -> str:
         """Tells data from others."""
-        digest = hashlib.sha256(json.dumps([self.name, self.ends.tolist()]).encode())
+        about = [self.name, self.ends.tolist(), self.song.tolist()]
+        digest = hashlib.sha256(json.dumps(about).encode())
         for name in sorted(self.columns):
             digest.update(np.ascontiguousarray(self.columns[name]).data)
         return digest.hexdigest()[:16]
@@ -140,7 +141,9 @@ def human_clips(source: Path) -> Clips:
     )
 
 
-def expert_clips(sources: Sequence[Path], columns: Sequence[str] = EXPERT) -> Clips:
+def expert_clips(
+    sources: Sequence[Path], columns: Sequence[str] = EXPERT, prior: str = ""
+) -> Clips:
     """How experts play, or teachers would: the episodes of data sets that are for training.
 
     Episodes of different data sets are of one song where these tell the same number, or name.
@@ -148,9 +151,10 @@ def expert_clips(sources: Sequence[Path], columns: Sequence[str] = EXPERT) -> Cl
     Args:
         sources: data sets.
         columns: which.
+        prior: the prior that all must have been recorded with, if that matters.
 
     Raises:
-        InputError: a data set is not there, or values in it are not finite.
+        InputError: a data set is not there or cannot be used, or values in it are not finite.
     """
 
     def clips() -> Iterator[tuple[str, int, dict[str, NDArray[Any]]]]:
@@ -158,6 +162,11 @@ def expert_clips(sources: Sequence[Path], columns: Sequence[str] = EXPERT) -> Cl
             data = ExpertData.open(source)
             for number, about in enumerate(data.episodes):
                 if about["split"] == TRAIN:
+                    if prior not in ("", about["prior"]):
+                        raise InputError(
+                            f"{source}: {about['name']} was played on the prior {about['prior']}; "
+                            f"this stage is played on {prior}"
+                        )
                     song = _song(about["song"], about["name"])
                     yield about["name"], song, data.columns(number, columns)
 

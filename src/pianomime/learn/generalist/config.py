@@ -116,10 +116,17 @@ def check_stage(config: StageConfig) -> None:
     Raises:
         InputError: the first of them, as it is called on the command line.
     """
-    for name in ("tip_noise", "hand_noise", "target_noise"):
-        within(name, getattr(config, name), 0, 1)
-    {"diffusion": _check_diffusion, "bet": _check_bet, "mlp": _check_mlp}[config.network](config)
+    for name, level in (("tip_noise", "high"), ("hand_noise", "high"), ("target_noise", "low")):
+        within(name, getattr(config, name), 0, 1 if config.level == level else 0)
+    networks = {"diffusion": _check_diffusion, "bet": _check_bet, "mlp": _check_mlp}
+    networks.pop(config.network)(config)
+    for name in networks:
+        if getattr(config, name) != _UNUSED[name]:
+            raise InputError(f"{name}.* does nothing here: this stage is {config.network}")
     check_fit(config.fit)
+
+
+_UNUSED = {"diffusion": DiffusionConfig(), "bet": BetConfig(), "mlp": MlpConfig()}
 
 
 def _check_diffusion(stage: StageConfig) -> None:
@@ -162,6 +169,8 @@ def _check_mlp(stage: StageConfig) -> None:
 
 _TIPS, _HANDS = 0.01, 0.06
 _TARGETS = 0.008
+# Controls take longer to learn than fingertips, and plain networks are quick.
+_LONG, _PLAIN = (FitConfig(steps=steps, learning_rate=1e-3) for steps in (10_000, 15_000))
 
 _STAGES: dict[StageName, StageConfig] = {
     "high-diff": StageConfig("high", "diffusion", tip_noise=_TIPS, hand_noise=_HANDS),
@@ -169,20 +178,20 @@ _STAGES: dict[StageName, StageConfig] = {
         "high", "diffusion", "binary", tip_noise=_TIPS, hand_noise=_HANDS
     ),
     "high-bet": StageConfig("high", "bet", tip_noise=_TIPS, hand_noise=_HANDS),
-    "low-diff": StageConfig("low", "diffusion", target_noise=_TARGETS),
-    "low-diff-no-sdf": StageConfig("low", "diffusion", "binary", target_noise=_TARGETS),
-    "low-diff-res": StageConfig("low", "diffusion", prior=True, target_noise=_TARGETS),
-    "low-bet": StageConfig("low", "bet", target_noise=_TARGETS),
+    "low-diff": StageConfig("low", "diffusion", target_noise=_TARGETS, fit=_LONG),
+    "low-diff-no-sdf": StageConfig("low", "diffusion", "binary", target_noise=_TARGETS, fit=_LONG),
+    "low-diff-res": StageConfig("low", "diffusion", prior=True, target_noise=_TARGETS, fit=_LONG),
+    "low-bet": StageConfig("low", "bet", target_noise=_TARGETS, fit=_LONG),
     "low-mse": StageConfig(
         "low",
         "mlp",
         "binary",
         target_noise=_TARGETS,
         mlp=MlpConfig((768, 768, 768)),
-        fit=FitConfig(steps=15_000, learning_rate=1e-3),
+        fit=_PLAIN,
     ),
-    "one-stage-diff": StageConfig("whole", "diffusion"),
-    "bc-mse": StageConfig("whole", "mlp", "binary"),
+    "one-stage-diff": StageConfig("whole", "diffusion", fit=_LONG),
+    "bc-mse": StageConfig("whole", "mlp", "binary", fit=_PLAIN),
 }
 
 _PAPER = {

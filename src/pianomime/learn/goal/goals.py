@@ -88,7 +88,8 @@ def read_goals(folders: Sequence[Path], unseen: float, tell: Tell) -> GoalSplit:
         tell: told how many files are read.
 
     Raises:
-        InputError: a folder has none, or fewer than two files can be read.
+        InputError: a folder has none, or fewer than two files can be read, or there are too few
+            goals in those that are kept.
     """
     found: dict[str, Goals] = {}
     skipped = 0
@@ -110,13 +111,16 @@ def read_goals(folders: Sequence[Path], unseen: float, tell: Tell) -> GoalSplit:
         )
     order = sorted(found)
     first = min(max(math.ceil(unseen * len(order)), 1), len(order) - 1)
-    return GoalSplit(
+    split = GoalSplit(
         train=Goals.union([found[digest] for digest in order[first:]]),
         unseen=Goals.union([found[digest] for digest in order[:first]]),
         files=len(order) - first,
         unseen_files=first,
         skipped=skipped,
     )
+    if split.unseen.keys(slice(3)).any(axis=1).sum() < 2:  # Silence is a goal, too.
+        raise InputError("the files that are kept to measure on have too few chords and notes")
+    return split
 
 
 class GoalDraw:

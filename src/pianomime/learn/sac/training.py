@@ -15,6 +15,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
+from pianomime.errors import InputError
 from pianomime.generalist.features import CONTROLS, TIPS, holding, low_inputs
 from pianomime.generalist.horizon import CHUNK
 from pianomime.learn.boundary import Boundary
@@ -189,9 +190,9 @@ def train_sac(
             "width": CONTROLS,
         }
         given = (torch.zeros(2, CHUNK, KEYS), torch.zeros(2, _VECTOR))
-        export_network(actor, given, ["goal", "vector"], ["said"], about, result)
         weights = {name: tensor.numpy().copy() for name, tensor in actor.state_dict().items()}
         folder.finish(weights, {})
+        export_network(actor, given, ["goal", "vector"], ["said"], about, result)
     return result
 
 
@@ -247,12 +248,15 @@ class _Boundary(Boundary):
         model, kept = self._learner, self._learner.replay_buffer
         assert kept is not None
         assert model.log_ent_coef is not None
-        for name in _REMEMBERED:
-            rows = arrays[f"buffer/{name}"]
-            getattr(kept, name)[: len(rows)] = rows
-        kept.pos = int(arrays["buffer/next"])
+        try:
+            for name in _REMEMBERED:
+                rows = arrays[f"buffer/{name}"]
+                getattr(kept, name)[: len(rows)] = rows
+            kept.pos = int(arrays["buffer/next"])
+            model.log_ent_coef.data.copy_(torch.from_numpy(arrays["temperature/log"]))
+        except (LookupError, ValueError, RuntimeError) as error:
+            raise InputError(f"{path}: the checkpoint does not fit the config") from error
         kept.full = len(rows) == kept.buffer_size
-        model.log_ent_coef.data.copy_(torch.from_numpy(arrays["temperature/log"]))
 
     def keep(self, update: int, steps: int) -> None:
         """As `Boundary.keep`."""
