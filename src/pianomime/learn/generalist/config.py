@@ -117,7 +117,10 @@ def check_stage(config: StageConfig) -> None:
         InputError: the first of them, as it is called on the command line.
     """
     for name, level in (("tip_noise", "high"), ("hand_noise", "high"), ("target_noise", "low")):
-        within(name, getattr(config, name), 0, 1 if config.level == level else 0)
+        within(name, getattr(config, name), 0, 1)
+        if getattr(config, name) and config.level != level:
+            option = name.replace("_", "-")
+            raise InputError(f"{option} does nothing here: it is for {level} levels")
     networks = {"diffusion": _check_diffusion, "bet": _check_bet, "mlp": _check_mlp}
     networks.pop(config.network)(config)
     for name in networks:
