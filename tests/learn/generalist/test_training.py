@@ -79,6 +79,26 @@ def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
         train("high-diff-no-sdf", data, tmp_path, tip_noise=0.5)
 
 
+@pytest.mark.parametrize("stage", ["high-diff-no-sdf", "low-diff"])
+def test_a_stage_that_was_stopped_comes_to_the_same(data, tmp_path, stage):
+    config = replace(
+        stage_config(stage), diffusion=TINY, fit=replace(SHORT, checkpoint_seconds=0.0)
+    )
+    demos, experts = (data / "demos", []) if "high" in stage else (None, [data / "experts.zarr"])
+
+    def stop(done, total, remark):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    def run(folder, tell=None):
+        return train_stage(stage, config, folder, demos, experts, data / "goal", tell)
+
+    whole = run(tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path / "parts", stop)
+    assert run(tmp_path / "parts").read_bytes() == whole.read_bytes()
+
+
 def test_what_another_goal_encoder_trained_is_not_gone_on_with(data, tmp_path):
     train("high-diff", data, tmp_path)
     config = GoalConfig(fit=replace(SHORT, bfloat16=False, seed=1))
