@@ -246,7 +246,9 @@ def main() -> None:
     )
     options.add_argument("-o", "--output", type=Path, default=common.ROOT / "out" / "tables")
     options.add_argument("--weights", type=Path, nargs="+", help="folders, one a training")
-    options.add_argument("--headline", default="two-stage-diff", help="method of all trainings")
+    options.add_argument(
+        "--headline", default="two-stage-diff", choices=METHODS, help="method of all trainings"
+    )
     options.add_argument("--seeds", type=int, nargs="+", default=(0, 1, 2), help="of what is drawn")
     options.add_argument(
         "--search-seeds", type=int, nargs="+", default=(0, 1, 2), help="of players that search"

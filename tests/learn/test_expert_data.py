@@ -170,9 +170,17 @@ def test_a_damaged_data_set_is_one_line(two_notes: Demonstration, tmp_path: Path
     chunk.write_bytes(chunk.read_bytes()[: chunk.stat().st_size // 2])
     with pytest.raises(InputError, match="damaged"):
         ExpertData.open(out).episode(0)
-    zarr.open_group(str(out)).attrs["episodes"] = []
+    zarr.open_group(str(out)).attrs["episodes"] = [{"name": "one"}]
     with pytest.raises(InputError, match="damaged"):
         ExpertData.open(out)
+    for ends in (np.zeros(0, int), np.array([[4]]), np.array([np.nan]), np.array([4, 4])):
+        zarr.open_group(str(out)).create_array("episode_end", data=ends, overwrite=True)
+        with pytest.raises(InputError, match="damaged"):
+            ExpertData.open(out)
+    for file, text in (("goal/zarr.json", '{"zarr'), ("zarr.json", "[]")):
+        (out / file).write_text(text)
+        with pytest.raises(InputError, match=r"damaged|not an expert"):
+            ExpertData.open(out)
 
 
 def test_published_files_of_another_shape(tmp_path: Path) -> None:

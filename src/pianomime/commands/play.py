@@ -42,7 +42,8 @@ class Play:
     folder of an expert (see `pianomime train-expert`), which plays what it was trained on."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
     """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
-    On two cores 1 takes about as long as the music or less, 2 and 3 several times longer."""
+    On two cores 1 takes about as long as the music or less, 2 and 3 several times longer. For
+    players that imitate it is 2, 5, 20 or 100 steps of a diffusion."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much to play at most, from what sounds at START or first after it [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0

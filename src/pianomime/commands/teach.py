@@ -27,10 +27,10 @@ class Teach:
 
     Examples:
       pianomime teach demonstrations.npz -o lessons.zarr
-      pianomime train high-diff --experts lessons.zarr -o first --goal out/generalist/goal
+      pianomime train high-diff --experts lessons.zarr
       pianomime train low-diff --experts lessons.zarr -o first --goal out/generalist/goal
       pianomime teach demonstrations.npz --pilot first/low-diff.onnx \
-        --planner first/high-diff.onnx -o more.zarr
+        --planner out/generalist/high-diff.onnx -o more.zarr
       pianomime train low-diff --experts lessons.zarr more.zarr
     """
 

@@ -33,6 +33,7 @@ from pianomime.learn.episode import COLUMNS, Episode
 FORMAT = "pianomime experts"
 VERSION = 2
 _CHUNK = 4096
+_TOLD = {"name", "f1", "prior", "song", "split"}
 
 
 def write_expert_data(path: Path, episodes: Iterator[Episode]) -> int:
@@ -119,28 +120,33 @@ class ExpertData:
         """
         try:
             group = zarr.open_group(str(path), mode="r")
-        except (OSError, ValueError, KeyError) as error:
+            attributes = dict(group.attrs)
+        # A damaged store raises what its codecs and its metadata happen to raise.
+        except (OSError, LookupError, ValueError, TypeError, AttributeError) as error:
             raise InputError(f"{path}: not an expert data set") from error
-        if group.attrs.get("format") != FORMAT:
+        if attributes.get("format") != FORMAT:
             raise InputError(f"{path}: not an expert data set")
-        if group.attrs.get("version") != VERSION:
+        if attributes.get("version") != VERSION:
             raise InputError(
-                f"{path}: an expert data set of version {group.attrs.get('version')}; "
+                f"{path}: an expert data set of version {attributes.get('version')}; "
                 f"this program reads {VERSION}"
             )
-        if "episode_end" not in group:
-            raise InputError(f"{path}: has no episode_end")
         try:
             ends = np.asarray(_array(group, "episode_end")[:])
-        except (RuntimeError, ValueError, OSError) as error:
+            shapes = {name: _array(group, name).shape for name in COLUMNS}
+        except (OSError, LookupError, ValueError, TypeError, RuntimeError) as error:
             raise InputError(f"{path}: damaged ({error})") from error
+        whole = ends.ndim == 1 and ends.dtype.kind in "iu" and len(ends) > 0
+        if not whole or not (np.diff(ends, prepend=0) > 0).all():
+            raise InputError(f"{path}: damaged, its episodes do not end one after the other")
         for name, column in COLUMNS.items():
-            if name not in group or _array(group, name).shape != (int(ends[-1]), *column.shape):
-                raise InputError(f"{path}: {name} is missing or has another shape")
-        episodes: Any = group.attrs.get("episodes")
-        rising = len(ends) > 0 and bool((np.diff(ends, prepend=0) > 0).all())
-        if not isinstance(episodes, list) or len(episodes) != len(ends) or not rising:
-            raise InputError(f"{path}: damaged, its episodes do not fit episode_end")
+            if shapes[name] != (int(ends[-1]), *column.shape):
+                raise InputError(f"{path}: {name} has another shape")
+        episodes: Any = attributes.get("episodes")
+        if not isinstance(episodes, list) or len(episodes) != len(ends):
+            raise InputError(f"{path}: damaged, it does not tell of each episode")
+        if not all(isinstance(one, dict) and one.keys() >= _TOLD for one in episodes):
+            raise InputError(f"{path}: damaged, it does not tell all of each episode")
         return cls(group, ends, episodes)
 
     def __len__(self) -> int:
@@ -176,5 +182,6 @@ class ExpertData:
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
     array = group[name]
-    assert isinstance(array, zarr.Array)
+    if not isinstance(array, zarr.Array):
+        raise TypeError(f"{name} is no array")
     return array

@@ -222,15 +222,18 @@ class _Learner:
             parts.setdefault(part, {})[rest] = array
         load_arrays(self.module, parts["module"], path)
         self.step = step
-        averages = parts["average"]
-        if len(averages) != len(self._parameters):
-            raise InputError(f"{path}: the checkpoint does not fit the config")
-        average = [torch.tensor(averages[str(index)]) for index in range(len(averages))]
-        self._average.load_state_dict({"optimization_step": step, "shadow_params": average})
+        try:
+            self._resume_moments(parts["average"], parts["adam"])
+        except (LookupError, ValueError, RuntimeError) as error:
+            raise InputError(f"{path}: the checkpoint does not fit the config") from error
+
+    def _resume_moments(self, averages: Arrays, moments: Arrays) -> None:
+        average = [torch.tensor(averages[str(i)]) for i in range(len(self._parameters))]
+        self._average.load_state_dict({"optimization_step": self.step, "shadow_params": average})
         self._average.to(self._device)
         known = self._optimizer.state_dict()
         known["state"] = {}
-        for name, array in parts["adam"].items():
+        for name, array in moments.items():
             index, _, field = name.partition("/")
             known["state"].setdefault(int(index), {})[field] = torch.tensor(array)
         self._optimizer.load_state_dict(known)
@@ -250,7 +253,8 @@ def _train(
         learner.resume(*state, folder.path)
     since: list[Tensor] = []
     looked = saved = time.monotonic()
-    waited = 0.0
+    # For batches, and in all that is neither looking nor keeping.
+    waited = spent = 0.0
     with ExitStack() as stack:
         log = None
         if learner.main:
@@ -258,6 +262,7 @@ def _train(
         for drawn, asked in stack.enter_context(closing(_batches(draw, config, learner.step))):
             waited += time.monotonic() - asked
             since.append(learner.update(loss, drawn))
+            spent += time.monotonic() - asked
             now, last = time.monotonic(), learner.step == config.steps
             save = last or now - saved > config.checkpoint_seconds
             every = config.evaluate_every
@@ -265,8 +270,8 @@ def _train(
             if not (save or measure or now - looked > _PAUSE):
                 continue
             # Before anything is kept.
-            figures = _look(since, learner.step) | {"fit/waited": waited / max(now - looked, 1e-9)}
-            since, looked, waited = [], now, 0.0
+            figures = _look(since, learner.step) | {"fit/waited": waited / spent}
+            since, looked, waited, spent = [], now, 0.0, 0.0
             if log is None:
                 continue
             log.add(learner.step, figures)

@@ -51,6 +51,23 @@ def test_what_was_trained_plays(two_notes, tmp_path, monkeypatch):
     assert made.stat().st_mtime_ns == written
 
 
+def test_a_file_of_another_training_is_not_taken_for_the_result(two_notes, tmp_path, monkeypatch):
+    songs, out = tmp_path / "songs", tmp_path / "out"
+    songs.mkdir()
+    out.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+    (out / "multi-task-sac.onnx").write_bytes(b"of another training")
+
+    def full(*_):
+        raise OSError("the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(training, "export_network", full)
+        with pytest.raises(OSError, match="full"):
+            train_sac([songs], out, SMALL, 1)
+    load_network(train_sac([songs], out, SMALL, 1))
+
+
 @pytest.mark.parametrize("buffer", [400, 60])
 def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monkeypatch, buffer):
     """Also when frames that were played first are forgotten again."""

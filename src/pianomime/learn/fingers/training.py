@@ -96,6 +96,8 @@ def train_fingers(
         network = actor_network(model).eval()
         measured = _measure(held, network)
         weights = {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}
+        # One of another training is not to be taken for this one if the export fails.
+        result.unlink(missing_ok=True)
         folder.finish(weights, measured)
         told = {"stage": FINGERS, "level": "fingers"}
         export_network(network, (torch.zeros(2, SIZE),), ["told"], ["said"], told, result)

@@ -191,6 +191,8 @@ def train_sac(
         }
         given = (torch.zeros(2, CHUNK, KEYS), torch.zeros(2, _VECTOR))
         weights = {name: tensor.numpy().copy() for name, tensor in actor.state_dict().items()}
+        # One of another training is not to be taken for this one if the export fails.
+        result.unlink(missing_ok=True)
         folder.finish(weights, {})
         export_network(actor, given, ["goal", "vector"], ["said"], about, result)
     return result
