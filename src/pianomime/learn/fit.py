@@ -33,6 +33,7 @@ from pianomime.learn.run_lock import run_lock
 from pianomime.learn.run_log import RunLog
 from pianomime.learn.tell import Tell
 from pianomime.learn.tensors import Arrays
+from pianomime.learn.torch_threads import torch_threads
 
 Batch = dict[str, Tensor]
 """Named tensors whose first axis is that of the samples."""
@@ -95,7 +96,10 @@ def fit(
         there = FitFolder(folder)
         if not there.finished:
             learner = _Learner(module, config, accelerator)
-            _train(there, learner, loss, draw, evaluate, tell)
+            # One core is for the batches that are drawn meanwhile: on two cores, two threads take
+            # nearly twice as long as one.
+            with torch_threads(max(torch.get_num_threads() - 1, 1)):
+                _train(there, learner, loss, draw, evaluate, tell)
             accelerator.wait_for_everyone()
     # From the device where it was trained: what comes next has no need of one.
     load_weights(folder, module.to("cpu"))

@@ -19,12 +19,13 @@ from stable_baselines3.common.logger import configure
 from pianomime.learn.boundary import Boundary
 from pianomime.learn.config import PpoConfig
 from pianomime.learn.policy import ACTIVATIONS, PolicyTracker
-from pianomime.learn.ppo_model import Ppo, actor_network, torch_threads
+from pianomime.learn.ppo_model import Ppo, actor_network
 from pianomime.learn.run_folder import Evaluation, RunFolder
 from pianomime.learn.song_batch import SongBatch
 from pianomime.learn.song_vec_env import SongVecEnv
 from pianomime.learn.tell import Tell
 from pianomime.learn.tensors import Arrays
+from pianomime.learn.torch_threads import torch_threads
 from pianomime.play import Player
 from pianomime.video.demonstration import DemonstrationPlanner
 

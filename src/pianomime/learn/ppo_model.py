@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import torch
 from stable_baselines3 import PPO
+
+from pianomime.learn.torch_threads import torch_threads
 
 
 class Ppo(PPO):
@@ -36,17 +36,6 @@ class Ppo(PPO):
                 super().train()
         finally:
             torch.set_float32_matmul_precision(precision)
-
-
-@contextmanager
-def torch_threads(threads: int) -> Iterator[None]:
-    """So many threads for torch, for a while."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(threads)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def actor_network(model: Any) -> torch.nn.Sequential:

@@ -20,11 +20,12 @@ from pianomime.learn.fingers.config import FingersConfig, check_fingers
 from pianomime.learn.fingers.fingers_env import AGENTS, FingersVecEnv, PlannedSong
 from pianomime.learn.fit_folder import FitFolder
 from pianomime.learn.generalist.export import export_network
-from pianomime.learn.ppo_model import Ppo, actor_network, torch_threads
+from pianomime.learn.ppo_model import Ppo, actor_network
 from pianomime.learn.run_log import RunLog
 from pianomime.learn.song import load_score
 from pianomime.learn.stage_folder import stage_folder
 from pianomime.learn.tell import Tell
+from pianomime.learn.torch_threads import torch_threads
 from pianomime.play import Player
 from pianomime.song_files import find_songs
 from pianomime.track import DynamicTracker, Tracker
