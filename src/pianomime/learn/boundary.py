@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from pianomime.errors import InputError
@@ -71,6 +72,26 @@ class Boundary(BaseCallback):
             raise InputError(f"{path}: the checkpoint does not fit the config") from error
         self.model.num_timesteps = steps
         self._fresh = False
+
+    def learn(
+        self, model: BaseAlgorithm, steps: int, state: tuple[Arrays, int] | None, path: Path
+    ) -> None:
+        """Have a model learn until it has done so many steps, from a checkpoint on if there is one.
+
+        Args:
+            model: made for the environments.
+            steps: in all, those before the checkpoint among them.
+            state: the checkpoint, and the steps done by then.
+            path: of it.
+
+        Raises:
+            InputError: it is that of another model.
+        """
+        self.init_callback(model)
+        if state is not None:
+            self.resume(*state, path)
+        # Steps that were taken before are added to those that it is told.
+        model.learn(steps - model.num_timesteps, self, reset_num_timesteps=state is None)
 
     def between_updates(self) -> None:
         """Keep what was learned, and begin the next update."""

@@ -47,18 +47,13 @@ def train_ppo(run: RunFolder, threads: int, tell: Tell) -> None:
     model = make_model(env, settings, run.config.seed, threads)
     model.set_logger(configure(str(run.tensorboard), ["tensorboard"]))
     boundary = _Boundary(run, env, tell)
-    boundary.init_callback(model)
-    state = run.state()
-    if state is not None:
-        arrays, about = state
+    state = None
+    kept = run.state()
+    if kept is not None:
+        arrays, about = kept
         boundary.curve = [Evaluation(**row) for row in about["curve"]]
-        boundary.resume(arrays, int(about["steps"]), run.path)
-    # Steps that were taken before are added to those that it is told.
-    model.learn(
-        run.config.steps - model.num_timesteps,
-        callback=boundary,
-        reset_num_timesteps=state is None,
-    )
+        state = arrays, int(about["steps"])
+    boundary.learn(model, run.config.steps, state, run.path)
     boundary.between_updates()
 
 

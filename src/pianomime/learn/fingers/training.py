@@ -85,15 +85,8 @@ def train_fingers(
         since = 1 if state is None else state[1] + 1
         with closing(RunLog(folder.tensorboard, since)) as log:
             boundary = _Boundary(folder, env, config, log, tell)
-            boundary.init_callback(model)
             model.set_logger(Logger(None, []))
-            if state is not None:
-                boundary.resume(*state, folder.path)
-            model.learn(
-                config.frames * AGENTS - model.num_timesteps,
-                callback=boundary,
-                reset_num_timesteps=state is None,
-            )
+            boundary.learn(model, config.frames * AGENTS, state, folder.path)
         network = actor_network(model).eval()
         measured = _measure(held, network)
         weights = {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}

@@ -172,14 +172,7 @@ def train_sac(
         since = 1 if state is None else state[1] + 1
         with closing(RunLog(folder.tensorboard, since)) as log:
             boundary = _Boundary(folder, env, config, log, tell)
-            boundary.init_callback(model)
-            if state is not None:
-                boundary.resume(*state, folder.path)
-            model.learn(
-                config.frames - model.num_timesteps,
-                callback=boundary,
-                reset_num_timesteps=state is None,
-            )
+            boundary.learn(model, config.frames, state, folder.path)
         actor = _Actor(scale, model.policy.actor).eval()
         about = {
             "stage": STAGE,
