@@ -2,8 +2,8 @@
 
     python benchmarks/cloning.py demonstrations.npz out/generalist/low-diff.onnx [LOW.onnx ...]
 
-Plays the clips of the songs that training keeps to measure on, with the human's fingertips, settled
-as the robot's hands can have them: by each low level, by its teacher (the dynamic tracker), and by
+Plays the clips of the songs that training keeps to measure on, with the human's fingertips made
+feasible for the robot's hands: by each low level, by its teacher (the dynamic tracker), and by
 inverse kinematics. The last two also play the fingertips as they were.
 """
 
@@ -17,14 +17,14 @@ from functools import partial
 from pathlib import Path
 
 import common
-from pianomime.generalist.methods import load_follower
-from pianomime.generalist.sampler import Sampler
-from pianomime.generalist.snap import flat_heights
-from pianomime.learn.generalist.clips import held_out, read_human
-from pianomime.plan.hand_path import settled
-from pianomime.play import Player
+from pianomime.learn.data.clips import held_out, read_human
+from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
+from pianomime.plan.hand_path import make_feasible
+from pianomime.players.player import Player
+from pianomime.policies.finger_assignment import flat_heights
+from pianomime.policies.methods import load_policy_tracker
+from pianomime.policies.sampler import Sampler
 from pianomime.track import DynamicTracker, IkTracker, Tracker
-from pianomime.video.demonstration import Demonstration, DemonstrationPlanner
 
 _AS_THEY_WERE = "as they were"
 
@@ -33,7 +33,7 @@ def score(demonstration: Demonstration, follower: str) -> dict[str, float]:
     """The metrics of one clip."""
     name, _, kind = follower.partition(", ")
     if kind != _AS_THEY_WERE:
-        plan = settled(demonstration.plan)
+        plan = make_feasible(demonstration.plan)
         if name != "dynamic":
             plan = replace(plan, fingertips=flat_heights(plan.fingertips, plan.finger_key))
         demonstration = replace(demonstration, plan=plan)
@@ -45,7 +45,7 @@ def score(demonstration: Demonstration, follower: str) -> dict[str, float]:
 def _tracker(name: str) -> Tracker:
     if name == "dynamic":
         return DynamicTracker()
-    return IkTracker() if name == "ik" else load_follower(Path(name), Sampler(2))
+    return IkTracker() if name == "ik" else load_policy_tracker(Path(name), Sampler(2))
 
 
 def main() -> None:

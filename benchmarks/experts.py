@@ -21,12 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import common
-from pianomime.learn.config import ExpertConfig, preset_config
-from pianomime.learn.expert import train_expert
-from pianomime.learn.experts import find_experts_songs
-from pianomime.learn.run_folder import RunFolder
-from pianomime.play import Player
-from pianomime.video.demonstration import DemonstrationPlanner
+from pianomime.learn.expert.config import ExpertConfig, preset_config
+from pianomime.learn.expert.expert import train_expert
+from pianomime.learn.expert.many import find_experts_songs
+from pianomime.learn.runs.run import RunFolder
+from pianomime.plan.demonstration import DemonstrationPlanner
+from pianomime.players.player import Player
 
 
 class TimeUpError(Exception):

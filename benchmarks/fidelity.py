@@ -25,15 +25,18 @@ from numpy.typing import NDArray
 from rich.progress import track
 
 import common
+from pianomime.keyboard import KEYS
 from pianomime.music import FrameMetrics, frame_metrics
 from pianomime.plan import FingertipPlan
 from pianomime.track import IkTracker
 from pianomime.world import PhysicsWarning, World
-from pianomime.world.figures import HAND_JOINTS, KEYS, key_travel
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
+from pianomime.world.model import SIDES
+from pianomime.world.parameters import key_travel
 
 _FREEDOM = 1.05 * 0.03
-_LEFT, _RIGHT = slice(0, HAND_JOINTS), slice(HAND_JOINTS, 2 * HAND_JOINTS)
+_LEFT, _RIGHT = slice(0, LAYOUT.hand_joints), slice(LAYOUT.hand_joints, 2 * LAYOUT.hand_joints)
 
 
 @dataclass(frozen=True)

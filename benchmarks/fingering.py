@@ -25,11 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import common
+from pianomime.keyboard import KEYS
 from pianomime.music import Score
 from pianomime.plan.fingering import find_fingering
+from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.plan.fingertip_plan import LEFT, RIGHT
-from pianomime.plan.hand_cost import FingeringConfig
-from pianomime.world.figures import KEYS
 
 _LOWEST_MIDI = 21
 # A note of a fingering and one of the MIDI file at this distance are the same [s].

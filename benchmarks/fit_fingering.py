@@ -18,7 +18,7 @@ import numpy as np
 
 import common
 from fingering import Count, Piece, compare, fingered
-from pianomime.plan.hand_cost import FingeringConfig
+from pianomime.plan.fingering_cost import FingeringConfig
 
 _SECONDS = 30.0
 _FACTOR = 4.0

@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 import common
 from pianomime.music import Score
 from pianomime.video import retarget as room
+from pianomime.video.hands.sightings import Sighting
 from pianomime.video.overlay import write_overlay
 from pianomime.video.retarget import RetargetConfig, retarget
-from pianomime.video.sightings import Sighting
 from pianomime.video.summary import write_summary
 
 sys.path.append(str(common.ROOT / "tests" / "video"))

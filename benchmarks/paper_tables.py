@@ -22,9 +22,9 @@ from typing import Any
 
 import common
 from pianomime.errors import InputError
-from pianomime.evaluation import evaluate
+from pianomime.evaluation.evaluation import evaluate
 from pianomime.files import atomic
-from pianomime.generalist.methods import FINGERS, METHODS, WEIGHTS, weight_files
+from pianomime.policies.methods import FINGERS, METHODS, WEIGHTS, weight_files
 
 FIGURES = ("precision", "recall", "f1")
 SETS = {"modern test12": "modern/test12", "Etude-12": "etude12"}

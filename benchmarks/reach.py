@@ -24,8 +24,8 @@ from pianomime.files import atomic
 from pianomime.plan import reach
 from pianomime.plan.fingertip_plan import FINGERS
 from pianomime.plan.joint_path import BLACK_REST, HOME, WHITE_REST, PathConfig, smooth_path
-from pianomime.world.figures import HAND_JOINTS
 from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
 
 _FILE = Path(reach.__file__).with_name("reach.json")
 _WITHIN = 0.003  # [m]
@@ -58,7 +58,7 @@ def distances(low: int, high: int, low_black: bool, high_black: bool) -> tuple[f
             targets[:, 1 + finger, 1] = side * tried
             weights[:, 1 + finger] = 1 / 0.0005
         clearance = np.full((len(tried), 5), np.nan)
-        path = smooth_path(hand, np.zeros(HAND_JOINTS), targets, weights, clearance, config)
+        path = smooth_path(hand, np.zeros(LAYOUT.hand_joints), targets, weights, clearance, config)
         points = np.array([hand.points(pose) for pose in path[1:]])
         error = np.linalg.norm((points - targets)[:, [1 + low, 1 + high]], axis=-1).max(axis=1)
         reached |= error <= _WITHIN

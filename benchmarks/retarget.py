@@ -25,13 +25,13 @@ import numpy as np
 import common
 from pianomime import Performance, Player, excerpt, songs
 from pianomime.music import Score, onset_f1
+from pianomime.plan.demonstration import Demonstration
 from pianomime.video import retarget as room
-from pianomime.video.demonstration import Demonstration
+from pianomime.video.keyboard.plane import Plane
 from pianomime.video.overlay import write_overlay
-from pianomime.video.plane import Plane
 from pianomime.video.retarget import RetargetConfig, retarget
 from pianomime.video.summary import write_summary
-from pianomime.world.figures import key_centres
+from pianomime.world.parameters import key_centres
 
 sys.path.append(str(common.ROOT / "tests" / "video"))
 

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 import common
+from pianomime.keyboard import FRAME_SECONDS
 from pianomime.music import Score
+from pianomime.music.excerpt import excerpt
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
-from pianomime.play import excerpt
-from pianomime.song_files import find_song
+from pianomime.songs.find import find_song
 from pianomime.track import DynamicTracker, IkTracker, Tracker
 from pianomime.world import World
-from pianomime.world.figures import CONTROL_DT
 
 TRACKERS: dict[str, Callable[[], Tracker]] = {"ik": IkTracker, "dynamic": DynamicTracker}
 
@@ -44,7 +44,7 @@ def measure(tracker: Tracker, plan: FingertipPlan) -> dict[str, float]:
         "control_ms_99": 1e3 * float(np.percentile(control, 99)),
         "control_ms_slowest": 1e3 * float(control.max()),
         "together_ms": 1e3 * each,
-        "realtime_factor": CONTROL_DT / each,
+        "realtime_factor": FRAME_SECONDS / each,
     }
 
 

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 
 import common
-from pianomime.learn.config import PpoConfig, preset_config
-from pianomime.learn.ppo import make_model
-from pianomime.learn.song import load_song
-from pianomime.learn.song_batch import SongBatch
-from pianomime.learn.song_vec_env import SongVecEnv
+from pianomime.learn.envs.batch import SongBatch
+from pianomime.learn.envs.reference import load_song
+from pianomime.learn.envs.sb3_env import Sb3Env
+from pianomime.learn.expert.config import PpoConfig, preset_config
+from pianomime.learn.expert.ppo import make_model
 from robopianist_peer import RobopianistPeer
 
 
@@ -42,7 +42,7 @@ class Ours:
 
     def __init__(self, song: str, envs: int, steps: int, ppo: PpoConfig) -> None:
         config = replace(preset_config("paper"), ppo=ppo)
-        self._vec = SongVecEnv(SongBatch(load_song(song), config.env, envs))
+        self._vec = Sb3Env(SongBatch(load_song(song), config.env, envs))
         self._vec.reset()
         draw = np.random.default_rng(0)
         self._actions = draw.uniform(-1, 1, (steps, envs, 46)).astype(np.float32) * 0.1

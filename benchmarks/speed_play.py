@@ -19,8 +19,8 @@ from typing import Any
 
 import common
 from pianomime import songs
-from pianomime.play import EFFORT
-from pianomime.song_files import find_songs
+from pianomime.players.player import EFFORT
+from pianomime.songs.find import find_songs
 
 
 def play(song: Path, seconds: float, effort: int, cores: list[int]) -> dict[str, Any]:

@@ -35,8 +35,8 @@ from numpy.typing import NDArray
 
 import common
 import workload
+from pianomime.keyboard import FRAME_SECONDS
 from pianomime.world import World, WorldBatch
-from pianomime.world.figures import CONTROL_DT
 from robopianist_peer import RobopianistPeer
 
 _BATCH_APPROACH = 20
@@ -118,8 +118,9 @@ def batch_runner(controls: Controls, worlds: int, threads: int) -> tuple[Callabl
 def song_controls(name: str) -> Controls:
     """The controls of a zero-shot performance."""
     from pianomime.music import Score
-    from pianomime.play import Player, excerpt
-    from pianomime.song_files import find_song
+    from pianomime.music.excerpt import excerpt
+    from pianomime.players.player import Player
+    from pianomime.songs.find import find_song
 
     score = excerpt(Score.from_midi(find_song(name)))
     controls: Controls = Player.from_name("zero-shot").play(score).ctrl
@@ -224,7 +225,7 @@ def main() -> None:
     names = [model.actuator(index).name for index in range(model.nu)]
     steps = arguments.steps
     workloads: dict[str, Callable[[], Controls]] = {
-        "waving": lambda: workload.waving(names, steps, CONTROL_DT),
+        "waving": lambda: workload.waving(names, steps, FRAME_SECONDS),
         "song": lambda: song_controls(arguments.song)[:steps],
         "expert": lambda: expert_controls(steps),
     }
@@ -248,7 +249,7 @@ def main() -> None:
 
 
 def show(name: str, result: dict[str, Any]) -> None:
-    print(f"\n{name}: {result['control_steps']} control steps of {CONTROL_DT} s\n")
+    print(f"\n{name}: {result['control_steps']} control steps of {FRAME_SECONDS} s\n")
     common.table(
         ("what", "control steps/s (median)", "slowest round", "fastest round"),
         [

@@ -30,14 +30,15 @@ from typing import Any
 import numpy as np
 
 import common
+from pianomime.keyboard import BLACK, KEYS
 from pianomime.music import Score, frame_metrics
+from pianomime.music.excerpt import excerpt
 from pianomime.plan.fingering import find_fingering
 from pianomime.plan.fingertip_plan import FINGERS, LEFT, RIGHT
 from pianomime.plan.reach import pair_limits
 from pianomime.plan.zero_shot import finger_keys
-from pianomime.play import excerpt
-from pianomime.song_files import find_songs
-from pianomime.world.figures import BLACK, KEYS, key_centres, key_half_sizes
+from pianomime.songs.find import find_songs
+from pianomime.world.parameters import key_centres, key_half_sizes
 
 _SETS = {
     "modern": ("modern/test12", None),

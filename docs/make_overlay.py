@@ -19,7 +19,7 @@ from PIL import Image
 
 from pianomime import Player, Score, excerpt, songs
 from pianomime.video import retarget as room
-from pianomime.video.film import Film
+from pianomime.video.film.film import Film
 from pianomime.video.overlay import write_overlay
 from pianomime.video.retarget import RetargetConfig, retarget
 from pianomime.video.stretches import RATE

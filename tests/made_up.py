@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pianomime.keyboard import NO_KEY
 from pianomime.music import Score
-from pianomime.performance import Performance
-from pianomime.plan import NO_KEY, FingertipPlan
+from pianomime.plan import FingertipPlan
+from pianomime.players.performance import Performance
 
 MIDDLE_C = 39
 

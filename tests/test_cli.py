@@ -36,7 +36,7 @@ def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_help_is_there_and_cheap() -> None:
-    heavy = ("numpy", "mujoco", "matplotlib", "torch", "rich", "pianomime.play")
+    heavy = ("numpy", "mujoco", "matplotlib", "torch", "rich", "pianomime.players.player")
     script = (
         "import sys, pianomime.cli as cli\n"
         "try: cli.main(['--help'])\n"

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 
 from any_score import scores
 from pianomime import songs
-from pianomime.generalist.methods import FINGERS, METHODS
 from pianomime.music import Score
-from pianomime.play import PLAYERS, Player, excerpt
+from pianomime.music.excerpt import excerpt
+from pianomime.players.player import PLAYERS, Player
+from pianomime.policies.methods import FINGERS, METHODS
 from pianomime.world import World
-from pianomime.world.figures import key_centres
+from pianomime.world.parameters import key_centres
 
 
 @pytest.mark.filterwarnings("ignore::pianomime.world.PhysicsWarning")

@@ -15,9 +15,10 @@ from matplotlib.image import imread
 import made_up
 from pianomime import Performance
 from pianomime.errors import InputError
+from pianomime.evaluation.summary import summarize
+from pianomime.files import staged
 from pianomime.music import Score
-from pianomime.numbers import numbers
-from pianomime.report import DARK, FILES, draw, staged, write_report
+from pianomime.report import DARK, FILES, draw, write_report
 from pianomime.report.mp3 import mp3
 from pianomime.world.render import RenderUnavailable
 
@@ -29,7 +30,7 @@ PROTOCOL = (
 
 def test_numbers_hold_what_was_agreed() -> None:
     score = made_up.score()
-    row = numbers(made_up.performance(score))
+    row = summarize(made_up.performance(score))
     assert set(row) == {*PROTOCOL, "notes", "dropped_notes", "blow_ups"}
     assert row["frames"] == len(score.roll())
     assert row["dropped_notes"] == 1

@@ -6,10 +6,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pianomime.evaluation import evaluate
+    from pianomime.evaluation.evaluation import evaluate
     from pianomime.music import Score
-    from pianomime.performance import Performance
-    from pianomime.play import Player, excerpt
+    from pianomime.music.excerpt import excerpt
+    from pianomime.players.performance import Performance
+    from pianomime.players.player import Player
 
 __version__ = "0.1.0"
 
@@ -17,11 +18,11 @@ __all__ = ["Performance", "Player", "Score", "__version__", "evaluate", "excerpt
 
 # Imported on first use, so that `pianomime --help` does not wait for the physics.
 _EXPORTS = {
-    "Performance": "pianomime.performance",
-    "Player": "pianomime.play",
+    "Performance": "pianomime.players.performance",
+    "Player": "pianomime.players.player",
     "Score": "pianomime.music",
-    "evaluate": "pianomime.evaluation",
-    "excerpt": "pianomime.play",
+    "evaluate": "pianomime.evaluation.evaluation",
+    "excerpt": "pianomime.music",
 }
 
 

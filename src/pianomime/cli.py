@@ -58,24 +58,31 @@ COMMANDS = {
         "pianomime.commands.train_experts", "TrainExperts", "train experts of many songs"
     ),
     "collect": Command("pianomime.commands.collect", "Collect", "make a data set of experts"),
-    "teach": Command("pianomime.commands.teach", "Teach", "make a data set by asking a teacher"),
-    "train-goal": Command(
-        "pianomime.commands.train_goal", "TrainGoal", "train what tells players their goals"
+    "collect-dagger": Command(
+        "pianomime.commands.collect_dagger", "CollectDagger", "make a data set by DAgger"
     ),
-    "train": Command("pianomime.commands.train", "Train", "train a network that plays every song"),
+    "train-goal": Command(
+        "pianomime.commands.train_goal", "TrainGoal", "train the goal autoencoder"
+    ),
+    "train": Command("pianomime.commands.train", "Train", "train a policy that plays every song"),
     "train-fingers": Command(
-        "pianomime.commands.train_fingers", "TrainFingers", "train what fingers add to zero-shot"
+        "pianomime.commands.train_fingers", "TrainFingers", "train the finger residual policy"
     ),
     "train-sac": Command(
-        "pianomime.commands.train_sac", "TrainSac", "train by trying, without demonstrations"
+        "pianomime.commands.train_sac", "TrainSac", "train multi-task SAC, a baseline"
     ),
-    "explain": Command("pianomime.commands.explain", "Explain", "say why notes went wrong"),
+    "diagnose": Command(
+        "pianomime.commands.diagnose", "Diagnose", "find why notes were missed or wrong"
+    ),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }
 
+ALIASES = {"teach": "collect-dagger", "explain": "diagnose"}
+"""Names that commands had before; they go with the next version."""
+
 
 def _help() -> str:
-    listed = "\n".join(f"  {name:<13} {command.summary}" for name, command in COMMANDS.items())
+    listed = "\n".join(f"  {name:<14} {command.summary}" for name, command in COMMANDS.items())
     return (
         "usage: pianomime COMMAND ...\n\n"
         "Give it a song, and two simulated robot hands play it.\n\n"
@@ -84,7 +91,7 @@ def _help() -> str:
         "  pianomime play ode-to-joy\n"
         "  pianomime play SONG.mid -o out/song --seconds 60\n"
         "  pianomime evaluate FOLDER -o out/all --jobs 2\n"
-        "  pianomime explain out/song/performance.npz\n"
+        "  pianomime diagnose out/song/performance.npz\n"
     )
 
 
@@ -134,6 +141,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _run(arguments: list[str]) -> None:
     name, *rest = arguments
+    name = ALIASES.get(name, name)
     if name in ("-h", "--help"):
         print(_help(), end="")
     elif name == "--version":

@@ -10,18 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pianomime.learn import tensors
-from pianomime.learn.config import (
+from pianomime.learn.data.clips import Clips
+from pianomime.learn.expert.config import (
     EnvConfig,
     EpisodeConfig,
     ExpertConfig,
     ObservationConfig,
     PpoConfig,
-    SearchConfig,
+    TrajectorySearchConfig,
 )
+from pianomime.learn.runs import safetensors_file
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
-from pianomime.video.demonstration import Demonstration
+from pianomime.plan.demonstration import Demonstration
+from pianomime.policies.features import rest_tips
 
 SMALL = PpoConfig(
     envs=4, steps_per_update=128, batch=64, epochs=2, hidden=(32, 16), learning_rate=1e-3
@@ -65,7 +67,7 @@ def small_ppo() -> ExpertConfig:
 @pytest.fixture
 def small_search() -> ExpertConfig:
     """A few passes that try little."""
-    search = SearchConfig(variations=4, rounds=1, ahead=6)
+    search = TrajectorySearchConfig(variations=4, rounds=1, ahead=6)
     return ExpertConfig(method="search", steps=600, env=EnvConfig(prior="ik"), search=search)
 
 
@@ -88,8 +90,31 @@ def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[], AbstractContextMa
     @contextmanager
     def disk() -> Iterator[None]:
         with monkeypatch.context() as patch:
-            patch.setattr(tensors.Path, "write_bytes", full)
+            patch.setattr(safetensors_file.Path, "write_bytes", full)
             with pytest.raises(OSError, match="No space left"):
                 yield
 
     return disk
+
+
+@pytest.fixture
+def clips() -> Clips:
+    """Three clips of 30, 7 and 20 frames, the first two of one song; every frame is another."""
+    draw = np.random.default_rng(0)
+    frames = 57
+    goal = np.zeros((frames, 88), bool)
+    goal[np.arange(frames), 20 + np.arange(frames) % 40] = True
+    return Clips(
+        {
+            "goal": goal,
+            "fingertips": (rest_tips() + draw.normal(0, 0.02, (frames, 2, 6, 3))).astype("f4"),
+            "joints": draw.normal(0, 0.1, (frames, 54)).astype("f4"),
+            "velocities": draw.normal(0, 1, (frames, 54)).astype("f4"),
+            "keys": np.where(goal, 0.5, 0.0).astype("f4"),
+            "prior": draw.normal(0, 0.1, (frames, 46)).astype("f4"),
+            "action": draw.normal(0, 0.1, (frames, 46)).astype("f4"),
+        },
+        np.array([30, 37, 57]),
+        np.array([4, 4, 9]),
+        ["a", "b", "c"],
+    )

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from pianomime.cli import main
-from pianomime.learn.run_folder import RunFolder
-from pianomime.video.demonstration import Demonstration
+from pianomime.learn.runs.run import RunFolder
+from pianomime.plan.demonstration import Demonstration
 
 QUICK = ["--steps", "200", "--search.variations", "4", "--search.rounds", "1"]
 
@@ -112,7 +112,8 @@ def test_without_the_extra_it_says_what_to_install() -> None:
 
 def test_torch_is_imported_only_to_learn() -> None:
     script = (
-        "import sys, pianomime.learn.expert, pianomime.learn.song_env, pianomime.learn.search\n"
+        "import sys, pianomime.learn.expert.expert, pianomime.learn.envs.gym_env\n"
+        "import pianomime.learn.expert.trajectory_search\n"
         "print([name for name in ('torch', 'stable_baselines3', 'zarr') if name in sys.modules])"
     )
     done = subprocess.run(

@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from any_score import chord, melody, score_of, scores
+from pianomime.keyboard import BLACK
 from pianomime.music import Score
 from pianomime.plan import LEFT, RIGHT
-from pianomime.plan import hand_cost as hand_cost_module
+from pianomime.plan import fingering_cost as hand_cost_module
 from pianomime.plan import reach as reach_module
 from pianomime.plan.fingering import Fingering, find_fingering
-from pianomime.song_files import find_song
-from pianomime.world.figures import BLACK, key_centres
+from pianomime.songs.find import find_song
+from pianomime.world.parameters import key_centres
 
 MIRROR = 82
 """Key k and key 82 - k are mirror images about D4: both black or both white."""

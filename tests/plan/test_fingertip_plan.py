@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pianomime.plan import LEFT, NO_KEY, RIGHT, FingertipPlan
+from pianomime.keyboard import NO_KEY
+from pianomime.plan import LEFT, RIGHT, FingertipPlan
 
 
 def plan(frames: int = 4, **changed: NDArray[np.generic]) -> FingertipPlan:

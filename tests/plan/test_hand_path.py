@@ -7,8 +7,8 @@ import pytest
 
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
-from pianomime.plan.hand_path import hand_paths, settled
-from pianomime.world.figures import key_centres
+from pianomime.plan.hand_path import hand_paths, make_feasible
+from pianomime.world.parameters import key_centres
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def plan() -> FingertipPlan:
 
 def test_a_human_with_other_hands_is_settled_on_the_same_keys(plan: FingertipPlan) -> None:
     human = replace(plan, fingertips=plan.fingertips + [0.01, 0.006, 0.0])
-    made = settled(human)
+    made = make_feasible(human)
     np.testing.assert_array_equal(made.finger_key, human.finger_key)
     frame, hand, finger = np.nonzero(made.finger_key >= 0)
     pressing = made.fingertips[frame, hand, finger + 1]
@@ -43,7 +43,7 @@ def test_idle_hands_stay_about_where_the_humans_were(plan: FingertipPlan) -> Non
         fingertips=plan.fingertips + [0.0, 0.16, 0.0],
         finger_key=np.full_like(plan.finger_key, -1),
     )
-    last = settled(idle).fingertips[-1, :, 0, 1] - plan.fingertips[-1, :, 0, 1]
+    last = make_feasible(idle).fingertips[-1, :, 0, 1] - plan.fingertips[-1, :, 0, 1]
     np.testing.assert_allclose(last, 0.16, atol=0.02)
 
 

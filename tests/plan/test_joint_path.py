@@ -15,7 +15,8 @@ from pianomime.plan.joint_path import (
     resting_height,
     smooth_path,
 )
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.model import SIDES
 
 JOINTS = 27
 HANDS = {side: Hand(side) for side in SIDES}

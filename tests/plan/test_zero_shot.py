@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 
 from any_score import chord, melody, score_of, scores
+from pianomime.keyboard import NO_KEY
 from pianomime.music import Score
-from pianomime.plan import NO_KEY, FingertipPlan, ZeroShotPlanner
-from pianomime.song_files import find_song
-from pianomime.world.figures import key_centres
+from pianomime.plan import FingertipPlan, ZeroShotPlanner
+from pianomime.songs.find import find_song
+from pianomime.world.parameters import key_centres
 
 
 def empty() -> Score:

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pianomime.keyboard import FRAME_SECONDS, NO_KEY
 from pianomime.music import Score, frame_metrics
-from pianomime.plan import NO_KEY, FingertipPlan, ZeroShotPlanner
+from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.plan.joint_path import HOME
-from pianomime.song_files import find_song
+from pianomime.songs.find import find_song
 from pianomime.track import DynamicTracker, IkTracker, Tracker
 from pianomime.track.dynamic import motion_torque, press_torque, to_actuators
 from pianomime.world import World
-from pianomime.world.figures import CONTROL_DT
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.model import SIDES
 
 JOINTS = 27
 HANDS = {side: Hand(side) for side in SIDES}
@@ -25,7 +26,7 @@ HANDS = {side: Hand(side) for side in SIDES}
 
 def swinging(hand: Hand, frames: int) -> NDArray[np.float64]:
     """(T + 1, 27) a path from the rest pose to a hand that swings well above the keys."""
-    time = np.arange(frames + 1)[:, None] * CONTROL_DT
+    time = np.arange(frames + 1)[:, None] * FRAME_SECONDS
     phase = np.arange(JOINTS)
     ranges = hand.high - hand.low
     middle = np.clip(0.5 * HOME, hand.low + 0.1 * ranges, hand.high - 0.1 * ranges)
@@ -69,11 +70,11 @@ def test_motion_torque_is_mujocos_inverse_dynamics(side: str) -> None:
     data = mujoco.MjData(model)
     path = swinging(hand, 20)
     torque = motion_torque(hand, path)
-    velocity = np.diff(path, axis=0) / CONTROL_DT
+    velocity = np.diff(path, axis=0) / FRAME_SECONDS
     for step in range(1, 19):
         data.qpos[:] = (path[step] + path[step + 1]) / 2
         data.qvel[:] = velocity[step]
-        data.qacc[:] = (velocity[step + 1] - velocity[step - 1]) / (2 * CONTROL_DT)
+        data.qacc[:] = (velocity[step + 1] - velocity[step - 1]) / (2 * FRAME_SECONDS)
         mujoco.mj_inverse(model, data)
         np.testing.assert_allclose(torque[step], data.qfrc_inverse, atol=1e-9)
 

@@ -17,7 +17,8 @@ from pianomime.plan import FingertipPlan
 from pianomime.track import IkConfig, IkTracker
 from pianomime.track.ik import bounded_least_squares
 from pianomime.world import World
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.model import SIDES
 
 JOINTS = 27
 ROWS = 18

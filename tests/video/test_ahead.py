@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from pianomime.video.ahead import ahead
+from pianomime.video.film.read_ahead import ahead
 
 
 def test_everything_comes_in_order():

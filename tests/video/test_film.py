@@ -5,13 +5,13 @@ import struct
 import wave
 
 import av
-import made_up_video as made_up
 import numpy as np
 import pytest
 from PIL import Image
 
+import made_up_video as made_up
 from pianomime.errors import InputError
-from pianomime.video.film import Film
+from pianomime.video.film.film import Film
 
 
 def clock(path, shown, size=(64, 48)):

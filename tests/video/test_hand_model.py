@@ -8,8 +8,8 @@ from http.client import IncompleteRead
 import pytest
 
 from pianomime.errors import InputError
-from pianomime.video import hand_model
-from pianomime.video.hand_model import find_hand_model
+from pianomime.video.hands import model as hand_model
+from pianomime.video.hands.model import find_hand_model
 
 
 @pytest.fixture
@@ -77,7 +77,7 @@ def test_mediapipe_and_opencv_come_late():
 
 def test_a_file_that_is_no_model(tmp_path):
     pytest.importorskip("mediapipe")
-    from pianomime.video.hand_detector import HandDetector
+    from pianomime.video.hands.detector import HandDetector
 
     model = tmp_path / "bad.task"
     model.write_bytes(b"nonsense")

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
-import made_up_video as made_up
 import numpy as np
 import pytest
 
+import made_up_video as made_up
 from pianomime.plan import LEFT, RIGHT
-from pianomime.video.hand_tracks import follow, poorly_seen
-from pianomime.video.sightings import Sighting
+from pianomime.video.hands.sightings import Sighting
+from pianomime.video.hands.tracks import follow, poorly_seen
 
 SIZE = (1280, 720)
 

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
-import made_up_video as made_up
 import numpy as np
 import pytest
 
-from pianomime.video.keyboard import find_keyboards, key_name
-from pianomime.world.figures import key_centres
+import made_up_video as made_up
+from pianomime.keyboard import key_name
+from pianomime.video.keyboard.keyboard import find_keyboards
+from pianomime.world.parameters import key_centres
 
 VIEWS = {
     "whole": ((1280, 720), {}),

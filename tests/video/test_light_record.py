@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pianomime.video.light_record import LightRecord
+from pianomime.video.film.light_record import LightRecord
 
 
 @pytest.mark.parametrize("frames", [1, 1999, 2000, 2001, 4500])

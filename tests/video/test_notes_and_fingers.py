@@ -1,19 +1,19 @@
 from __future__ import annotations
 
-import made_up_video as made_up
 import numpy as np
 import pytest
 
+import made_up_video as made_up
+from pianomime.keyboard import NO_KEY
 from pianomime.music import Score, onset_f1
-from pianomime.plan import NO_KEY
 from pianomime.video.align import align, raised
-from pianomime.video.hand_tracks import HandTracks
-from pianomime.video.light_record import LightRecord
-from pianomime.video.midi_offset import estimate_offset
-from pianomime.video.note_fingers import find_note_fingers
-from pianomime.video.note_reading import read_notes
+from pianomime.video.film.light_record import LightRecord
+from pianomime.video.hands.tracks import HandTracks
+from pianomime.video.notes.fingers import find_note_fingers
+from pianomime.video.notes.offset import estimate_offset
+from pianomime.video.notes.reading import read_notes
 from pianomime.video.parallax import take_back_parallax
-from pianomime.world.figures import key_centres
+from pianomime.world.parameters import key_centres
 
 DARK = 40
 BOTH = np.array([True, True])

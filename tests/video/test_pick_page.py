@@ -6,14 +6,14 @@ import threading
 import urllib.error
 import urllib.request
 
-import made_up_video as made_up
 import pytest
 
+import made_up_video as made_up
 from pianomime import cli
-from pianomime.video import pick_page
-from pianomime.video.film import Film
-from pianomime.video.pick_page import PickPage
-from pianomime.video.points import SUGGESTED, place_of, read_points
+from pianomime.video.film.film import Film
+from pianomime.video.keyboard import pick_page
+from pianomime.video.keyboard.pick_page import PickPage
+from pianomime.video.keyboard.points import SUGGESTED, place_of, read_points
 
 SIZE = (320, 180)
 

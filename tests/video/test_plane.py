@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import json
 
-import made_up_video as made_up
 import numpy as np
 import pytest
 
+import made_up_video as made_up
 from pianomime.errors import InputError
-from pianomime.video.plane import fit_plane, fit_plane_robustly
-from pianomime.video.points import SUGGESTED, place_of, read_points
+from pianomime.video.keyboard.plane import fit_plane, fit_plane_robustly
+from pianomime.video.keyboard.points import SUGGESTED, place_of, read_points
 
 
 def some_points(count=12, seed=0):

@@ -5,17 +5,17 @@ from __future__ import annotations
 import shutil
 
 import av
-import made_up_video as made_up
 import numpy as np
 import pytest
 
+import made_up_video as made_up
 from pianomime import cli
+from pianomime.keyboard import NO_KEY
 from pianomime.music import onset_f1
-from pianomime.plan import NO_KEY
+from pianomime.plan.demonstration import Demonstration
 from pianomime.video import retarget as room
-from pianomime.video.demonstration import Demonstration
-from pianomime.video.film import Film
-from pianomime.video.light_record import LightRecord
+from pianomime.video.film.film import Film
+from pianomime.video.film.light_record import LightRecord
 from pianomime.video.retarget import RetargetConfig, retarget
 
 SIZE = (640, 360)

@@ -5,8 +5,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pianomime.music import Score
-from pianomime.play import Player
-from pianomime.song_files import find_song
+from pianomime.players.player import Player
+from pianomime.songs.find import find_song
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pianomime.keyboard import KEYS
 from pianomime.world import PhysicsWarning, World, WorldBatch
-from pianomime.world.figures import KEYS
 
 WORLDS = 3
 STEPS = 80

@@ -9,12 +9,15 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pianomime.world import World
-from pianomime.world.figures import HAND_JOINTS
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
+from pianomime.world.model import SIDES
 
 TX = 0  # The joint along the keyboard.
 HANDS = {side: Hand(side) for side in SIDES}
-SHARES = st.lists(st.floats(0, 1), min_size=HAND_JOINTS, max_size=HAND_JOINTS).map(np.array)
+SHARES = st.lists(st.floats(0, 1), min_size=LAYOUT.hand_joints, max_size=LAYOUT.hand_joints).map(
+    np.array
+)
 
 
 def pose(hand: Hand, share: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -57,7 +60,7 @@ def test_jacobian_is_the_slope_of_the_points(side: str, share: NDArray[np.float6
     slopes = np.stack(
         [
             (hand.points(qpos + step * one) - hand.points(qpos - step * one)) / (2 * step)
-            for one in np.eye(HAND_JOINTS)
+            for one in np.eye(LAYOUT.hand_joints)
         ],
         axis=-1,
     )
@@ -67,9 +70,9 @@ def test_jacobian_is_the_slope_of_the_points(side: str, share: NDArray[np.float6
 @pytest.mark.parametrize("side", SIDES)
 def test_points_are_the_callers_own(side: str) -> None:
     hand = HANDS[side]
-    points = hand.points(np.zeros(HAND_JOINTS))
+    points = hand.points(np.zeros(LAYOUT.hand_joints))
     kept = points.copy()
-    hand.points(np.full(HAND_JOINTS, 0.1))
+    hand.points(np.full(LAYOUT.hand_joints, 0.1))
     np.testing.assert_array_equal(points, kept)
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.world.figures import KEYS, LEFT_JOINTS, RIGHT_JOINTS
+from pianomime.keyboard import KEYS
+from pianomime.world.layout import LAYOUT
 from pianomime.world.model import build_spec, fingertip_sites, hand_model, world_model
 
 SIDES = ("rh", "lh")
@@ -50,7 +51,7 @@ def test_joint_order() -> None:
         *(f"{side}_{joint}" for side in SIDES for joint in JOINTS),
     ]
     assert (model.nq, model.nv) == (142, 142)
-    assert (slice(88, 115), slice(115, 142)) == (RIGHT_JOINTS, LEFT_JOINTS)
+    assert (slice(88, 115), slice(115, 142)) == (LAYOUT.joints[1], LAYOUT.joints[0])
 
 
 def test_actuator_order() -> None:
@@ -114,7 +115,7 @@ def test_no_mesh_files_and_few_meshes() -> None:
 @pytest.mark.parametrize("side", SIDES)
 def test_hand_alone_is_the_hand_of_the_world(side: str) -> None:
     world, hand = world_model(), hand_model(side)
-    mine = RIGHT_JOINTS if side == "rh" else LEFT_JOINTS
+    mine = LAYOUT.joints[1] if side == "rh" else LAYOUT.joints[0]
     np.testing.assert_array_equal(hand.jnt_range, world.jnt_range[mine])
     np.testing.assert_array_equal(hand.dof_damping, world.dof_damping[mine])
     in_world = [world.body(hand.body(index).name).id for index in range(1, hand.nbody)]

@@ -7,9 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from pianomime.keyboard import KEYS
 from pianomime.world import render
-from pianomime.world.figures import KEYS, key_travel
 from pianomime.world.model import build_spec
+from pianomime.world.parameters import key_travel
 from pianomime.world.render import RenderUnavailable, render_frame, write_video
 from pianomime.world.scene_look import CAMERAS, dress
 

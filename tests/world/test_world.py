@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pianomime.keyboard import BLACK, KEYS
 from pianomime.world import PhysicsWarning, World
-from pianomime.world.figures import BLACK, KEYS, LEFT_JOINTS, RIGHT_JOINTS, key_travel
+from pianomime.world.layout import LAYOUT
 from pianomime.world.model import build_spec
+from pianomime.world.parameters import key_travel
 
 TX = 20  # Along the keyboard, among a hand's actuators.
 
@@ -245,7 +247,7 @@ def test_broken_physics_is_counted_and_told(song_controls: NDArray[np.float64]) 
         world.step(song_controls[40])
     assert len(told) == 1
     assert world.blow_ups == 1
-    along = [RIGHT_JOINTS.start, LEFT_JOINTS.start]
+    along = [LAYOUT.joints[1].start, LAYOUT.joints[0].start]
     np.testing.assert_array_equal(world.qpos[along], before[along])
     assert np.count_nonzero(world.qpos) == 2
     assert not world.data.qvel.any()

@@ -11,7 +11,7 @@ import tyro
 
 if TYPE_CHECKING:
     from pianomime.commands.progress import Tell
-    from pianomime.learn.episode import Episode
+    from pianomime.learn.data.episode import Episode
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class Collect:
         from pianomime.commands.progress import bars
 
         with extra("train"), bars() as tell:
-            from pianomime.learn.expert_data import write_expert_data
+            from pianomime.learn.data.trajectories import write_expert_data
 
             number = write_expert_data(self.out, self._episodes(tell))
         print(f"saved {number} episodes: {self.out}")
 
     def _episodes(self, tell: Tell) -> Iterator[Episode]:
         from pianomime.errors import InputError
-        from pianomime.learn.episode import play_episode, published_episodes
-        from pianomime.learn.run_folder import RunFolder, find_runs
+        from pianomime.learn.data.episode import play_episode, published_episodes
+        from pianomime.learn.runs.run import RunFolder, find_runs
 
         if not self.runs:
             raise InputError("no runs to collect")

@@ -49,7 +49,7 @@ class Evaluate:
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.progress import bars
-        from pianomime.evaluation import evaluate, markdown
+        from pianomime.evaluation.evaluation import evaluate, markdown
 
         seeded = f"-seed{self.seed}" if self.seed else ""
         out = self.out or Path("out", f"evaluate-{self.player}-{self.effort}{seeded}")

@@ -16,7 +16,7 @@ class ImportDemos:
     SOURCE is a folder with PianoMime's high-level zarr data set, an .npz file of clips one after
     the other (length, fingertips, goal_packed), or one of a single clip (fingertips, goal). OUT
     then holds one .npz for each clip, also of those that are not for training; each tells which
-    it is, and `pianomime train` and `pianomime teach` leave these out.
+    it is, and `pianomime train` and `pianomime collect-dagger` leave these out.
 
     Examples:
       pianomime import-demos DATASET.zarr -o demos
@@ -38,8 +38,8 @@ class ImportDemos:
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.progress import bars
-        from pianomime.report import staged
-        from pianomime.video.published import read_published
+        from pianomime.files import staged
+        from pianomime.learn.data.published import read_published
 
         out = self.out or Path("out", f"demos-{self.source.stem}")
         number = 0

@@ -40,8 +40,8 @@ class Pick:
         import webbrowser
 
         from pianomime.errors import InputError
-        from pianomime.video.film import Film
-        from pianomime.video.pick_page import PickPage
+        from pianomime.video.film.film import Film
+        from pianomime.video.keyboard.pick_page import PickPage
 
         out = self.out or Path("out", self.video.stem + "-points.json")
         if out.suffix != ".json":

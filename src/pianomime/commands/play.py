@@ -11,9 +11,9 @@ import tyro
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from pianomime.evaluation.summary import Row
     from pianomime.music import Score
-    from pianomime.numbers import Row
-    from pianomime.play import Player
+    from pianomime.players.player import Player
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,8 @@ class Play:
         from rich.console import Console
 
         from pianomime.commands.progress import bars
-        from pianomime.report import FILES, staged, write_report
+        from pianomime.files import staged
+        from pianomime.report import FILES, write_report
 
         player, score, name = self._cast()
         out = self.out or Path("out", name)
@@ -78,14 +79,15 @@ class Play:
     def _cast(self) -> tuple[Player, Score, str]:
         """Who plays what, and the name of its file."""
         from pianomime.music import Score
-        from pianomime.play import DEMONSTRATION_PLAYERS, PLAYERS, Player, excerpt
-        from pianomime.song_files import find_song
+        from pianomime.music.excerpt import excerpt
+        from pianomime.players.player import DEMONSTRATION_PLAYERS, PLAYERS, Player
+        from pianomime.songs.find import find_song
 
         known = {*PLAYERS, *DEMONSTRATION_PLAYERS}
         if self.player is not None and self.player not in known and Path(self.player).is_dir():
             return self._cast_expert(Path(self.player))
         if Path(self.song).suffix == ".npz":
-            from pianomime.video.demonstration import Demonstration
+            from pianomime.plan.demonstration import Demonstration
 
             shown = Demonstration.load(self.song).excerpt(self.start, self.seconds)
             if self.player in PLAYERS:
@@ -107,8 +109,8 @@ class Play:
             if getattr(self, name) != getattr(Play, name):
                 raise InputError(f"--{name}: an expert plays what it was trained on, as it does")
         with extra("train"):
-            from pianomime.learn.expert import load_expert
-            from pianomime.learn.song import load_score
+            from pianomime.learn.envs.reference import load_score
+            from pianomime.learn.expert.expert import load_expert
 
             player, run = load_expert(folder)
             score = load_score(self.song, run.start, run.seconds)

@@ -52,7 +52,7 @@ class Retarget:
         """
         from pianomime.commands.progress import bars
         from pianomime.errors import InputError
-        from pianomime.report import staged
+        from pianomime.files import staged
         from pianomime.video.overlay import write_overlay
         from pianomime.video.retarget import RetargetConfig, retarget
         from pianomime.video.summary import write_summary

@@ -10,7 +10,7 @@ import tyro
 
 from pianomime.commands.named import named
 from pianomime.errors import InputError
-from pianomime.learn.generalist.config import STAGES, Size, StageConfig, StageName, stage_config
+from pianomime.learn.imitation.config import POLICIES, PolicyConfig, PolicyName, Size, policy_config
 
 
 @dataclass(frozen=True)
@@ -28,20 +28,20 @@ class Train:
       pianomime train high-diff --size paper --demonstrations demos -o out/paper
     """
 
-    stage: Annotated[tyro.conf.Positional[StageName], tyro.conf.arg(metavar="STAGE")]
+    stage: Annotated[tyro.conf.Positional[PolicyName], tyro.conf.arg(metavar="STAGE")]
     """Which network."""
     demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
     """What high levels learn from instead: a folder of demonstrations, or published ones (.npz)."""
     experts: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DATA...")] = ()
-    """What is learned from: data sets that `pianomime teach` or `pianomime collect` made."""
+    """Data sets made by `pianomime collect-dagger` or `pianomime collect`."""
     goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """The goal encoder; OUT/goal if not given."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
     """Folder for the results, shared by all stages."""
     size: Size = "small"
     """Of the network: one for two cores, or the paper's for a GPU; settings below change it."""
-    config: Annotated[StageConfig, tyro.conf.arg(name="")] = field(
-        default_factory=lambda: stage_config("high-diff")
+    config: Annotated[PolicyConfig, tyro.conf.arg(name="")] = field(
+        default_factory=lambda: policy_config("high-diff")
     )
     """Everything else."""
 
@@ -51,10 +51,10 @@ class Train:
         # Not what an option is given, such as a folder of that name.
         after = zip(["", *arguments], arguments, strict=False)
         alone = {argument for before, argument in after if not before.startswith("-")}
-        stage = next((name for name in STAGES if name in alone), STAGES[0])
+        stage = next((name for name in POLICIES if name in alone), POLICIES[0])
         # Any other is refused when the command line is parsed.
         size: Size = "paper" if named("--size", arguments, "small") == "paper" else "small"
-        return cls(stage=tyro.MISSING, config=stage_config(stage, size))
+        return cls(stage=tyro.MISSING, config=policy_config(stage, size))
 
     def run(self) -> None:
         """Train.
@@ -66,12 +66,12 @@ class Train:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
-        if _kind(self.config) != _kind(stage_config(self.stage)):
+        if _kind(self.config) != _kind(policy_config(self.stage)):
             raise InputError(f"name the stage first: pianomime train {self.stage} ...")
         with extra("train"), bars() as tell:
-            from pianomime.learn.generalist.training import train_stage
+            from pianomime.learn.imitation.training import train_policy
 
-            made = train_stage(
+            made = train_policy(
                 self.stage,
                 self.config,
                 self.out,
@@ -83,6 +83,6 @@ class Train:
         print(f"saved: {made}")
 
 
-def _kind(config: StageConfig) -> tuple[str, str, str, bool]:
+def _kind(config: PolicyConfig) -> tuple[str, str, str, bool]:
     """What a stage's name stands for: defaults are taken by it, before arguments are parsed."""
     return config.level, config.network, config.code, config.prior

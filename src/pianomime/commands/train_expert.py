@@ -10,7 +10,7 @@ import tyro
 
 from pianomime.commands.extras import extra
 from pianomime.commands.named import named
-from pianomime.learn.config import ExpertConfig, preset_config
+from pianomime.learn.expert.config import ExpertConfig, preset_config
 
 PresetName = Literal["paper", "best"]
 
@@ -58,7 +58,7 @@ class TrainExpert:
         from pianomime.commands.progress import bars
 
         with extra("train"):
-            from pianomime.learn.expert import train_expert
+            from pianomime.learn.expert.expert import train_expert
         out = self.out or Path("out", f"expert-{Path(self.song).stem}-{self.preset}")
         with bars() as tell, extra("train"):
             run = train_expert(

@@ -12,7 +12,7 @@ import tyro
 from pianomime.commands.extras import extra
 from pianomime.commands.named import named
 from pianomime.commands.train_expert import PresetName
-from pianomime.learn.config import ExpertConfig, preset_config
+from pianomime.learn.expert.config import ExpertConfig, preset_config
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class TrainExperts:
         from pianomime.commands.progress import bars
 
         with extra("train"):
-            from pianomime.learn.experts import experts_table, train_experts
+            from pianomime.learn.expert.many import experts_table, train_experts
         out = self.out or Path("out", f"experts-{self.folder.name}-{self.preset}")
         with bars() as tell, extra("train" if self.ray is None else "scale"):
             rows = train_experts(

@@ -16,6 +16,6 @@ with contextlib.suppress(ModuleNotFoundError):
 
     gymnasium.register(
         "pianomime/Song-v0",
-        entry_point="pianomime.learn.song_env:SongEnv",
-        vector_entry_point="pianomime.learn.song_vector_env:SongVectorEnv",
+        entry_point="pianomime.learn.envs.gym_env:SongEnv",
+        vector_entry_point="pianomime.learn.envs.gym_vector_env:SongVectorEnv",
     )

@@ -1,16 +1,16 @@
 """Music: scores, MIDI files, rolls, metrics and sound. It knows nothing of robots."""
 
+from pianomime.music.excerpt import excerpt
 from pianomime.music.metrics import FrameMetrics, frame_metrics, onset_f1, pedal_f1
 from pianomime.music.notes import notes_from_roll
-from pianomime.music.score import KEYS, LOWEST_PITCH, Score, ScoreError
+from pianomime.music.score import Score, ScoreError
 from pianomime.music.sound import render_audio, write_wav
 
 __all__ = [
-    "KEYS",
-    "LOWEST_PITCH",
     "FrameMetrics",
     "Score",
     "ScoreError",
+    "excerpt",
     "frame_metrics",
     "notes_from_roll",
     "onset_f1",

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.files import atomic
-from pianomime.music.score import KEYS, LOWEST_PITCH, MAX_SECONDS, Score, ScoreError
+from pianomime.keyboard import KEYS, LOWEST_PITCH
+from pianomime.music.score import MAX_SECONDS, Score, ScoreError
 
 SUSTAIN_PEDAL = 64
 PEDAL_DOWN = 64

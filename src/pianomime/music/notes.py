@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.music.score import KEYS, ScoreError
+from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.music.score import ScoreError
 
 
 def notes_from_roll(
-    roll: ArrayLike, dt: float = 0.05
+    roll: ArrayLike, dt: float = FRAME_SECONDS
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """The notes in a roll: each run of frames with a key down is one.
 

@@ -11,10 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pianomime.errors import InputError
-
-KEYS = 88
-LOWEST_PITCH = 21
-"""MIDI pitch of key 0, the A at the bass end of the keyboard."""
+from pianomime.keyboard import FRAME_SECONDS, KEYS
 
 MAX_SECONDS = 4 * 3600.0
 """Longest score. A damaged MIDI file can claim years, and its roll would not fit in memory."""
@@ -105,7 +102,7 @@ class Score:
         write_midi(self, Path(path))
 
     @classmethod
-    def from_roll(cls, roll: ArrayLike, dt: float = 0.05, title: str = "") -> Score:
+    def from_roll(cls, roll: ArrayLike, dt: float = FRAME_SECONDS, title: str = "") -> Score:
         """The score whose keys are down exactly where a roll says so, without pedal.
 
         Args:
@@ -172,7 +169,7 @@ class Score:
         """
         return replace(self, key=self.key + semitones)
 
-    def frames(self, dt: float = 0.05) -> int:
+    def frames(self, dt: float = FRAME_SECONDS) -> int:
         """Number of frames T of the roll: floor(duration / dt) + 1.
 
         So a piece that ends exactly on a frame boundary has one silent frame after it, as in
@@ -180,7 +177,7 @@ class Score:
         """
         return math.floor(self.duration * _rate(dt)) + 1
 
-    def note_frames(self, dt: float = 0.05) -> NDArray[np.int64]:
+    def note_frames(self, dt: float = FRAME_SECONDS) -> NDArray[np.int64]:
         """The frames in which each note holds its key down.
 
         A note begins in frame floor(onset / dt) and ends before frame ceil(offset / dt), but
@@ -222,7 +219,7 @@ class Score:
         frames[order] = np.reshape(np.array(spans, np.int64), (-1, 2))
         return np.minimum(frames, self.frames(dt))
 
-    def roll(self, dt: float = 0.05) -> NDArray[np.bool_]:
+    def roll(self, dt: float = FRAME_SECONDS) -> NDArray[np.bool_]:
         """Which keys are down in each frame, see `note_frames`.
 
         Args:
@@ -237,7 +234,7 @@ class Score:
             down[first:stop, key] = True
         return down
 
-    def pedal_roll(self, dt: float = 0.05) -> NDArray[np.bool_]:
+    def pedal_roll(self, dt: float = FRAME_SECONDS) -> NDArray[np.bool_]:
         """Whether the sustain pedal is down in each frame: its state when the frame ends.
 
         A pedal still down when the last note ends stays down to the last frame.

@@ -1,13 +1,12 @@
 """Planners: from a Score to a FingertipPlan."""
 
-from pianomime.plan.fingertip_plan import FINGERS, LEFT, NO_KEY, POINTS, RIGHT, FingertipPlan
+from pianomime.plan.fingertip_plan import FINGERS, LEFT, POINTS, RIGHT, FingertipPlan
 from pianomime.plan.planner import Planner
 from pianomime.plan.zero_shot import ZeroShotConfig, ZeroShotPlanner
 
 __all__ = [
     "FINGERS",
     "LEFT",
-    "NO_KEY",
     "POINTS",
     "RIGHT",
     "FingertipPlan",

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import KEYS
 from pianomime.music import Score
-from pianomime.plan.fingertip_plan import FINGER_COUNT, LEFT, RIGHT
-from pianomime.plan.hand_cost import (
+from pianomime.plan.fingering_cost import (
     LATE,
     FingeringConfig,
     Fingers,
@@ -20,7 +20,8 @@ from pianomime.plan.hand_cost import (
     chord_cost,
     hand_cost,
 )
-from pianomime.world.figures import KEYS
+from pianomime.plan.fingertip_plan import LEFT, RIGHT
+from pianomime.world.layout import FINGER_COUNT
 
 # Notes of one onset that may be left out, by how many there are; or all of them but two or one,
 # or all. Of six or fewer, any.

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import KEYS
+
 LEFT, RIGHT = 0, 1
 """Index of a hand in every plan array: keyboard order, bass side first."""
 
-POINTS = ("forearm", "thumb", "index", "middle", "ring", "little")
+POINTS = ("wrist", "thumb", "index", "middle", "ring", "little")
 FINGERS = POINTS[1:]
-FINGER_COUNT = len(FINGERS)
-NO_KEY = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class FingertipPlan:
 
     def keys(self) -> NDArray[np.bool_]:
         """(T, 88) bool: the keys that some finger is to press in each frame."""
-        down = np.zeros((len(self), 88), bool)
+        down = np.zeros((len(self), KEYS), bool)
         frame, hand, finger = np.nonzero(self.finger_key >= 0)
         down[frame, self.finger_key[frame, hand, finger]] = True
         return down

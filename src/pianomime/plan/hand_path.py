@@ -8,10 +8,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.plan.fingertip_plan import NO_KEY, FingertipPlan
+from pianomime.keyboard import BLACK, NO_KEY
+from pianomime.plan.fingertip_plan import FingertipPlan
 from pianomime.plan.joint_path import KEY_REST, PathConfig, smooth_path
-from pianomime.world.figures import BLACK, HAND_JOINTS, key_centres
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
+from pianomime.world.model import SIDES
+from pianomime.world.parameters import key_centres
 
 # Where along a white key each finger strikes it: in front of the black keys, thumb and little
 # finger, the short ones, nearest the player [m].
@@ -64,13 +67,15 @@ def hand_paths(
             weights[idle, :2] = 1 / config.alike
             targets[:, 0] = others[:, index, 0]
             weights[:, 0, 1] = 1 / config.alike_wrist
-        path = smooth_path(hand, np.zeros(HAND_JOINTS), targets, weights, clearance, config.path)
+        path = smooth_path(
+            hand, np.zeros(LAYOUT.hand_joints), targets, weights, clearance, config.path
+        )
         fingertips[:, index] = [hand.points(pose) for pose in path[1:]]
         fingertips[:, index, 1:, 2][finger_key[:, index] >= 0] = 0.0
     return fingertips
 
 
-def settled(plan: FingertipPlan, config: HandPathConfig | None = None) -> FingertipPlan:
+def make_feasible(plan: FingertipPlan, config: HandPathConfig | None = None) -> FingertipPlan:
     """A human's plan as the robot's hands can do it: the same fingers on the same keys.
 
     Human hands have other proportions, and what was seen of them is not exact. All that is taken

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from pianomime.world.figures import BLACK, CONTROL_DT, HAND_JOINTS, key_centres, key_half_sizes
+from pianomime.keyboard import BLACK, FRAME_SECONDS
 from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
+from pianomime.world.parameters import key_centres, key_half_sizes
 
 HOME = np.array(
     [0.0, 0.0, -0.01, -0.1, -0.05]
@@ -95,8 +97,8 @@ def smooth_path(
     path[:, 0] = _slide_guess(hand, targets, weights)
     damping = config.damping**-2
     for _ in range(config.iterations):
-        gradient = np.empty((frames, HAND_JOINTS))
-        blocks = np.empty((frames, HAND_JOINTS, HAND_JOINTS))
+        gradient = np.empty((frames, LAYOUT.hand_joints))
+        blocks = np.empty((frames, LAYOUT.hand_joints, LAYOUT.hand_joints))
         for frame in range(frames):
             points, jacobian = hand.points_and_jacobian(path[frame])
             error = (points - targets[frame]) * weights[frame]
@@ -105,14 +107,14 @@ def smooth_path(
             below = lack < 0.0
             error[1:, 2][below] = lack[below] / config.floor
             rows[1:, 2][below] = jacobian[1:, 2][below] / config.floor
-            rows = rows.reshape(-1, HAND_JOINTS)
+            rows = rows.reshape(-1, LAYOUT.hand_joints)
             blocks[frame] = rows.T @ rows
             gradient[frame] = rows.T @ error.ravel()
         gradient += posture * (path - home) + path @ coupling
         blocks += np.diag(posture + damping) + coupling
         # A joint at a limit that it is pushed against stays there for this step.
         held = ((path <= hand.low) & (gradient > 0)) | ((path >= hand.high) & (gradient < 0))
-        blocks[:, np.arange(HAND_JOINTS), np.arange(HAND_JOINTS)] += held * _HELD
+        blocks[:, np.arange(LAYOUT.hand_joints), np.arange(LAYOUT.hand_joints)] += held * _HELD
         step = _step(blocks, gradient, stiffness, path, start)
         path = np.clip(path + np.clip(step, -config.step, config.step), hand.low, hand.high)
     return np.vstack([start, path])
@@ -128,14 +130,14 @@ def resting_height(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _posture_weights(config: PathConfig) -> NDArray[np.float64]:
-    weights = np.full(HAND_JOINTS, config.posture**-2)
+    weights = np.full(LAYOUT.hand_joints, config.posture**-2)
     weights[0] = 0.0
     weights[1:3] = config.slide_posture**-2
     return weights
 
 
 def _coupling_hessian(config: PathConfig) -> NDArray[np.float64]:
-    hessian = np.zeros((HAND_JOINTS, HAND_JOINTS))
+    hessian = np.zeros((LAYOUT.hand_joints, LAYOUT.hand_joints))
     for one, other in _COUPLED:
         pair = np.ix_([one, other], [one, other])
         hessian[pair] += np.array([[1.0, -1.0], [-1.0, 1.0]]) / config.coupling**2
@@ -159,9 +161,9 @@ def _slide_guess(
 
 
 def _acceleration_weights(config: PathConfig) -> NDArray[np.float64]:
-    scale = np.full(HAND_JOINTS, config.joint_acceleration)
+    scale = np.full(LAYOUT.hand_joints, config.joint_acceleration)
     scale[:3] = config.slide_acceleration
-    weights: NDArray[np.float64] = (scale * CONTROL_DT**2) ** -2
+    weights: NDArray[np.float64] = (scale * FRAME_SECONDS**2) ** -2
     return weights
 
 
@@ -180,22 +182,22 @@ def _step(
     frames = len(path)
     # The hand sets off from rest: before the first frame it is at the start, twice.
     second = np.diff(np.vstack([start, start, path]), n=2, axis=0)
-    second = np.vstack([second, np.zeros((2, HAND_JOINTS))])
+    second = np.vstack([second, np.zeros((2, LAYOUT.hand_joints))])
     gradient = gradient + stiffness * (second[:-2] - 2.0 * second[1:-1] + second[2:])
-    band = np.zeros((2 * HAND_JOINTS + 1, frames, HAND_JOINTS))
-    for below in range(HAND_JOINTS):
-        column = np.arange(HAND_JOINTS - below)
+    band = np.zeros((2 * LAYOUT.hand_joints + 1, frames, LAYOUT.hand_joints))
+    for below in range(LAYOUT.hand_joints):
+        column = np.arange(LAYOUT.hand_joints - below)
         band[below][:, column] = blocks[:, column + below, column]
     # A frame is part of its own second difference and, but for the last two, of the next two's.
     later, latest = ((np.arange(frames) < frames - lag)[:, None] for lag in (1, 2))
     ties = (1.0 + 4.0 * later + latest, -2.0 * later - 2.0 * latest, 1.0 * latest)
     for lag in range(3):
-        band[lag * HAND_JOINTS] += ties[lag] * stiffness
+        band[lag * LAYOUT.hand_joints] += ties[lag] * stiffness
     step: NDArray[np.float64] = solveh_banded(
-        band.reshape(2 * HAND_JOINTS + 1, -1),
+        band.reshape(2 * LAYOUT.hand_joints + 1, -1),
         -gradient.ravel(),
         lower=True,
         overwrite_ab=True,
         check_finite=False,
     )
-    return step.reshape(frames, HAND_JOINTS)
+    return step.reshape(frames, LAYOUT.hand_joints)

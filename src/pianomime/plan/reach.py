@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import BLACK, KEYS
 from pianomime.plan.fingertip_plan import LEFT
-from pianomime.world.figures import BLACK, KEYS, key_centres
+from pianomime.world.parameters import key_centres
 
 _FIGURES: dict[str, Any] = json.loads(
     resources.files("pianomime.plan").joinpath("reach.json").read_text("utf-8")

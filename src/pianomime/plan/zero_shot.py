@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import NO_KEY
 from pianomime.music import Score
 from pianomime.plan.fingering import Fingering, find_fingering
-from pianomime.plan.fingertip_plan import NO_KEY, FingertipPlan
-from pianomime.plan.hand_cost import FingeringConfig
+from pianomime.plan.fingering_cost import FingeringConfig
+from pianomime.plan.fingertip_plan import FingertipPlan
 from pianomime.plan.hand_path import HandPathConfig, hand_paths
 
 

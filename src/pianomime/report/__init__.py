@@ -1,20 +1,19 @@
 """What a person looks at: the pictures, the page."""
 
-from pianomime.report.explanation import EXPLANATION_FILES, write_explanation
+from pianomime.keyboard import key_name
+from pianomime.report.diagnosis import DIAGNOSIS_FILES, write_diagnosis
 from pianomime.report.picture import draw
-from pianomime.report.roll import DARK, LIGHT, Theme, key_name
-from pianomime.report.staging import staged
+from pianomime.report.roll import DARK, LIGHT, Theme
 from pianomime.report.write import FILES, write_report
 
 __all__ = [
     "DARK",
-    "EXPLANATION_FILES",
+    "DIAGNOSIS_FILES",
     "FILES",
     "LIGHT",
     "Theme",
     "draw",
     "key_name",
-    "staged",
-    "write_explanation",
+    "write_diagnosis",
     "write_report",
 ]

@@ -6,7 +6,7 @@ import base64
 from html import escape
 from string import Template
 
-from pianomime.numbers import Row
+from pianomime.evaluation.summary import Row
 
 _PAGE = Template("""\
 <!doctype html>
@@ -129,7 +129,7 @@ def page(
     """The report as one self-contained HTML page.
 
     Args:
-        numbers: what `pianomime.numbers` gives.
+        numbers: what `pianomime.evaluation.summary` gives.
         version: of PianoMime.
         played: MP3 of the performance.
         wanted: MP3 of the score.

@@ -10,8 +10,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from pianomime.performance import Performance
 from pianomime.plan import LEFT, RIGHT
+from pianomime.players.performance import Performance
 from pianomime.report.roll import LIGHT, Layer, Lines, Theme, corners, legend, runs, sheet
 
 _NOBODY = 2

@@ -14,7 +14,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pianomime.performance import FRAMES_A_SECOND, Performance
+from pianomime.keyboard import FRAME_RATE, KEYS, LOWEST_PITCH, key_name
+from pianomime.players.performance import Performance
 
 WIDTH = 12.0
 """Of every picture [inches]."""
@@ -26,9 +27,7 @@ _ROW_SECONDS = 16.0
 _MOST_ROWS = 24
 """More music than fits on these lines (over 6 minutes) is packed more densely."""
 _FEWEST_KEYS = 36
-_LOWEST_MIDI = 21  # key 0 is A0
 _BLACK = (1, 3, 6, 8, 10)  # within an octave from C
-_NAMES = ("C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯", "A", "A♯", "B")
 _FOOT = 0.2  # [inches]
 
 
@@ -104,7 +103,7 @@ class Lines:
         # A score of 30 s has 601 frames; the silent last one is not worth a line.
         seconds = performance.song_seconds - 0.1
         rows = min(_MOST_ROWS, max(1, math.ceil(seconds / _ROW_SECONDS)))
-        broken = tuple(float(frame) / FRAMES_A_SECOND for frame in performance.blow_ups)
+        broken = tuple(float(frame) / FRAME_RATE for frame in performance.blow_ups)
         return cls(rows, math.ceil(max(seconds / rows, 1.0)), *_key_range(performance), broken)
 
     @property
@@ -149,7 +148,7 @@ class Lines:
 
 def corners(runs: NDArray[np.int64]) -> NDArray[np.float64]:
     """(M, 4, 2) corners [s, keys] of the boxes of runs (M, 3): first frame, end frame, key."""
-    start, end = runs[:, 0] / FRAMES_A_SECOND, runs[:, 1] / FRAMES_A_SECOND
+    start, end = runs[:, 0] / FRAME_RATE, runs[:, 1] / FRAME_RATE
     low, high = runs[:, 2] + 0.08, runs[:, 2] + 0.92
     return np.stack([start, low, start, high, end, high, end, low], axis=1).reshape(-1, 4, 2)
 
@@ -160,12 +159,6 @@ def runs(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
     column, start = np.nonzero(np.diff(padded) == 1)
     _, end = np.nonzero(np.diff(padded) == -1)
     return np.stack([start, end, column], axis=1)
-
-
-def key_name(key: int) -> str:
-    """Name of a key 0..87, such as C4 for middle C."""
-    octave, step = divmod(key + _LOWEST_MIDI, 12)
-    return f"{_NAMES[step]}{octave - 1}"
 
 
 def sheet(height: float, title: str, remark: str, theme: Theme) -> Figure:
@@ -205,16 +198,16 @@ def _key_range(performance: Performance) -> tuple[int, int]:
     low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (40, 40)
     middle = (low + high) / 2
     low = max(0, min(low - 2, int(middle - _FEWEST_KEYS / 2)))
-    high = min(88, max(high + 2, low + _FEWEST_KEYS))
+    high = min(KEYS, max(high + 2, low + _FEWEST_KEYS))
     return low, high
 
 
 def _paper(axes: Axes, low: int, high: int, theme: Theme) -> None:
     """Stripes for black keys, a line and a label for every C."""
     for key in range(low, high):
-        if (key + _LOWEST_MIDI) % 12 in _BLACK:
+        if (key + LOWEST_PITCH) % 12 in _BLACK:
             axes.axhspan(key, key + 1, color=theme.black_keys, linewidth=0)
-    octaves = [key for key in range(low, high) if (key + _LOWEST_MIDI) % 12 == 0]
+    octaves = [key for key in range(low, high) if (key + LOWEST_PITCH) % 12 == 0]
     for key in octaves:
         axes.axhline(key, color=theme.lines, linewidth=0.8)
     axes.set_yticks([key + 0.5 for key in octaves], [key_name(key) for key in octaves])

@@ -9,9 +9,9 @@ from pathlib import Path
 from matplotlib.colors import to_rgb
 
 from pianomime import __version__
+from pianomime.evaluation.summary import Row, summarize
 from pianomime.music import render_audio, write_wav
-from pianomime.numbers import Row, numbers
-from pianomime.performance import Performance
+from pianomime.players.performance import Performance
 from pianomime.report.mp3 import mp3
 from pianomime.report.page import page
 from pianomime.report.picture import draw
@@ -52,10 +52,10 @@ def write_report(
         note: told, in one line, what could not be made and why.
 
     Returns:
-        The numbers, as in `report.json`.
+        The summarize, as in `report.json`.
     """
     progress("reporting", 0, 0)
-    row = numbers(performance)
+    row = summarize(performance)
     played = performance.played()
     performance.save(folder / "performance.npz")
     played.to_midi(folder / "performance.mid")

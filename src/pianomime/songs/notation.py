@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pianomime.music import LOWEST_PITCH, Score, ScoreError
+from pianomime.keyboard import LOWEST_PITCH
+from pianomime.music import Score, ScoreError
 
 SEMITONES = {"C": 0, "D": 2, "E": 4, "F": 5, "G": 7, "A": 9, "B": 11}
 RELEASE = 0.05

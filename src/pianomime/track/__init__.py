@@ -3,7 +3,7 @@
 from pianomime.track.batch import BatchTracker
 from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
-from pianomime.track.rollout import RolloutConfig, RolloutTracker
+from pianomime.track.predictive_sampling import PredictiveSamplingConfig, PredictiveSamplingTracker
 from pianomime.track.tracker import PedalTracker, Tracker
 
 __all__ = [
@@ -13,7 +13,7 @@ __all__ = [
     "IkConfig",
     "IkTracker",
     "PedalTracker",
-    "RolloutConfig",
-    "RolloutTracker",
+    "PredictiveSamplingConfig",
+    "PredictiveSamplingTracker",
     "Tracker",
 ]

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.plan.joint_path import (
     KEY_REST,
@@ -21,8 +22,10 @@ from pianomime.plan.joint_path import (
     smooth_path,
 )
 from pianomime.world import World
-from pianomime.world.figures import CONTROL_DT, HAND_JOINTS, key_centres
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
+from pianomime.world.model import SIDES
+from pianomime.world.parameters import key_centres
 
 # Forearm slides and wrist, the first joints of a hand.
 _ARM_JOINTS = 5
@@ -76,7 +79,7 @@ class DynamicTracker:
             targets, weights = self._wishes(plan.fingertips[:, index], plan.finger_key[:, index])
             clearance = np.full(pressing.shape, np.nan)
             path = smooth_path(
-                hand, np.zeros(HAND_JOINTS), targets, weights, clearance, self.config.path
+                hand, np.zeros(LAYOUT.hand_joints), targets, weights, clearance, self.config.path
             )
             self._paths.append(path)
             self._tips.append(np.array([hand.points(pose)[1:] for pose in path]))
@@ -186,9 +189,9 @@ def motion_torque(hand: Hand, path: NDArray[np.float64]) -> NDArray[np.float64]:
     For each control step: at its middle, with the accelerations of its two ends averaged.
     """
     middle = (path[1:] + path[:-1]) / 2
-    velocity = np.diff(path, axis=0) / CONTROL_DT
+    velocity = np.diff(path, axis=0) / FRAME_SECONDS
     padded = np.vstack([np.zeros_like(velocity[:1]), velocity, velocity[-1:]])
-    acceleration = (padded[2:] - padded[:-2]) / (2 * CONTROL_DT)
+    acceleration = (padded[2:] - padded[:-2]) / (2 * FRAME_SECONDS)
     torque = np.empty_like(middle)
     data = mujoco.MjData(hand.model)
     for step in range(len(middle)):

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from pianomime.plan import FingertipPlan
 from pianomime.world import World
-from pianomime.world.hand import SIDES, Hand
+from pianomime.world.hand import Hand
+from pianomime.world.model import SIDES
 
 
 @dataclass(frozen=True)

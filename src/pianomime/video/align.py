@@ -8,11 +8,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import BLACK, NO_KEY
 from pianomime.music import Score
-from pianomime.plan import NO_KEY, FingertipPlan
-from pianomime.video.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
-from pianomime.video.note_fingers import NoteFingers
-from pianomime.world.figures import BLACK, key_centres, key_half_sizes
+from pianomime.plan import FingertipPlan
+from pianomime.video.keyboard.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
+from pianomime.video.notes.fingers import NoteFingers
+from pianomime.world.parameters import key_centres, key_half_sizes
 
 Rule = Literal["steady", "paper"]
 """How fingertips are put on their keys."""

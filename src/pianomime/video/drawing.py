@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from pianomime.plan import LEFT, NO_KEY
-from pianomime.video.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
-from pianomime.video.plane import Plane
-from pianomime.world.figures import BLACK, KEYS, key_centres, key_half_sizes
+from pianomime.keyboard import BLACK, KEYS, NO_KEY
+from pianomime.plan import LEFT
+from pianomime.video.keyboard.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
+from pianomime.video.keyboard.plane import Plane
+from pianomime.world.parameters import key_centres, key_half_sizes
 
 HAND_COLOURS = ((255, 176, 0), (0, 200, 255))
 """Of the left and the right hand."""

@@ -11,9 +11,8 @@ import av
 import numpy as np
 
 from pianomime.files import atomic
-from pianomime.plan import NO_KEY
+from pianomime.keyboard import FRAME_RATE, NO_KEY
 from pianomime.video.drawing import Drawing
-from pianomime.video.rate import RATE
 from pianomime.video.retarget import Retargeted
 
 
@@ -36,7 +35,7 @@ def write_overlay(
         av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as film,
     ):
         stream: Any = None
-        for number, frame in enumerate(made.film.frames(RATE)):
+        for number, frame in enumerate(made.film.frames(FRAME_RATE)):
             if number >= len(tracks):
                 break
             drawn = drawing.draw(
@@ -48,12 +47,12 @@ def write_overlay(
             # H.264 wants even sizes.
             drawn = drawn[: drawn.shape[0] // 2 * 2, : drawn.shape[1] // 2 * 2]
             if stream is None:
-                stream = film.add_stream("libx264", rate=round(RATE))
+                stream = film.add_stream("libx264", rate=round(FRAME_RATE))
                 stream.height, stream.width = drawn.shape[:2]
                 stream.pix_fmt = "yuv420p"
                 stream.options = {"crf": "26", "preset": "superfast"}
             picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(drawn), format="rgb24")
-            picture.pts, picture.time_base = number, Fraction(1, round(RATE))
+            picture.pts, picture.time_base = number, Fraction(1, round(FRAME_RATE))
             film.mux(stream.encode(picture))
             if tell is not None:
                 tell("overlay", number + 1, len(tracks))

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.music import Score
-from pianomime.video.note_fingers import NoteFingers
-from pianomime.world.figures import key_centres
+from pianomime.video.notes.fingers import NoteFingers
+from pianomime.world.parameters import key_centres
 
 _FEWEST = 20
 """Notes."""

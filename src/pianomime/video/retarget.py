@@ -13,32 +13,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.keyboard import FRAME_RATE, key_name
 from pianomime.music import Score
 from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import LEFT, RIGHT
+from pianomime.plan.demonstration import Demonstration, on_grid
 from pianomime.video.align import Rule, align, raised
-from pianomime.video.demonstration import Demonstration, on_grid
-from pianomime.video.film import Film
-from pianomime.video.hand_detector import HandDetector
-from pianomime.video.hand_model import find_hand_model
-from pianomime.video.hand_tracks import HandTracks, follow, poorly_seen
-from pianomime.video.key_light import ZONES, KeyLight
-from pianomime.video.keyboard import find_keyboards, key_name
-from pianomime.video.light_record import LightRecord
-from pianomime.video.midi_offset import Offset, estimate_offset
-from pianomime.video.note_fingers import NoteFingers, find_note_fingers
-from pianomime.video.note_reading import read_notes
+from pianomime.video.film.film import Film
+from pianomime.video.film.light_record import LightRecord
+from pianomime.video.hands.detector import HandDetector
+from pianomime.video.hands.model import find_hand_model
+from pianomime.video.hands.sightings import Sightings
+from pianomime.video.hands.tracks import HandTracks, follow, poorly_seen
+from pianomime.video.keyboard.keyboard import find_keyboards
+from pianomime.video.keyboard.plane import Plane
+from pianomime.video.keyboard.points import read_points
+from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
+from pianomime.video.notes.key_light import ZONES, KeyLight
+from pianomime.video.notes.offset import Offset, estimate_offset
+from pianomime.video.notes.reading import read_notes
 from pianomime.video.parallax import take_back_parallax
-from pianomime.video.plane import Plane
-from pianomime.video.points import read_points
-from pianomime.video.rate import RATE
-from pianomime.video.sightings import Sightings
 from pianomime.video.stretches import stretches
 
 Tell = Callable[[str, int, int], None]
 
 _BACKGROUND_FRAMES = 25
-_MOST_FRAMES = int(MAX_SECONDS * RATE) - 1
+_MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
 """That a score can be as long as; files need not say how long they are."""
 _TOO_FEW_TOUCHED = 0.5
 """Share of a MIDI file's notes with a finger on their key below which it is of another song."""
@@ -164,7 +164,7 @@ def retarget(
     found = tracks.found
     quality: dict[str, Any] = {
         "keyboard": seen,
-        "seconds": len(tracks) / RATE,
+        "seconds": len(tracks) / FRAME_RATE,
         "both_hands_found": round(float(found.all(axis=1).mean()), 4),
         "left_hand_found": round(float(found[:, 0].mean()), 4),
         "right_hand_found": round(float(found[:, 1].mean()), 4),
@@ -200,10 +200,10 @@ def _watch(
 ) -> Sightings:
     """In one pass over the film find the hands in each frame, and fill the records."""
     sightings = Sightings()
-    total = round(film.seconds * RATE)
+    total = round(film.seconds * FRAME_RATE)
     with HandDetector(model) as detector:
-        for number, frame in enumerate(islice(film.frames(RATE), _MOST_FRAMES)):
-            sightings.append(detector.detect(frame.picture, round(number * 1000 / RATE)))
+        for number, frame in enumerate(islice(film.frames(FRAME_RATE), _MOST_FRAMES)):
+            sightings.append(detector.detect(frame.picture, round(number * 1000 / FRAME_RATE)))
             for reader, light in zip(readers, lights, strict=True):
                 light.append(reader.read(frame.picture))
             tell("hands", number + 1, max(total, number + 1))
@@ -268,7 +268,7 @@ def _score(
     remarks: list[str],
 ) -> tuple[Score, dict[str, Any]]:
     """What is played, timed by the video, and figures about it."""
-    seconds = len(tracks) / RATE
+    seconds = len(tracks) / FRAME_RATE
     if score is None or offset is None:
         read = read_notes(light, tracks, film.path.stem)
         if not len(read.score):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
-from pianomime.video.rate import RATE
+from pianomime.keyboard import FRAME_RATE
 
 _SHORTEST = 0.5
 """[s]"""
@@ -17,7 +17,7 @@ def stretches(holds: NDArray[np.bool_]) -> list[tuple[float, float]]:
     closed = binary_closing(np.pad(holds, 2), np.ones(3))[2:-2]
     edges = np.flatnonzero(np.diff(closed.astype(np.int8), prepend=0, append=0))
     return [
-        (float(first / RATE), float(end / RATE))
+        (float(first / FRAME_RATE), float(end / FRAME_RATE))
         for first, end in edges.reshape(-1, 2)
-        if end - first >= _SHORTEST * RATE
+        if end - first >= _SHORTEST * FRAME_RATE
     ]

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from pianomime.files import atomic
+from pianomime.keyboard import FRAME_RATE
 from pianomime.plan import LEFT, RIGHT
 from pianomime.video.drawing import HAND_COLOURS, Drawing
-from pianomime.video.rate import RATE
 from pianomime.video.retarget import Retargeted
 
 _PICTURES = 3
@@ -72,7 +72,7 @@ def _timeline(made: Retargeted) -> bytes:
     tracks, score, fingers = made.tracks, made.demonstration.score, made.fingers
     figure = Figure(figsize=(12, 4.5), layout="constrained")
     hands, notes = figure.subplots(2, 1, sharex=True)
-    seconds = np.arange(len(tracks)) / RATE
+    seconds = np.arange(len(tracks)) / FRAME_RATE
     some = slice(None, None, max(1, len(tracks) // _MOST_POINTS))
     for hand, name in ((LEFT, "left"), (RIGHT, "right")):
         colour = np.array(HAND_COLOURS[hand]) / 255
@@ -103,7 +103,7 @@ def _pictures(made: Retargeted) -> list[NDArray[np.uint8]]:
         if not len(part):
             continue
         number = int(part[busy[part].argmax()])
-        frame = next(made.film.frames(RATE, number), None)
+        frame = next(made.film.frames(FRAME_RATE, number), None)
         if frame is not None:
             points, found = made.tracks.points[number], made.tracks.found[number]
             drawn.append(drawing.draw(frame.picture, points, found, finger_key[number]))

@@ -9,24 +9,24 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.world.figures import SUBSTEPS
+from pianomime.world.layout import LAYOUT
 from pianomime.world.model import world_model
-from pianomime.world.moment import (
+from pianomime.world.parameters import SUBSTEPS
+from pianomime.world.state import (
     BLOW_UP,
-    POSITIONS,
     RESETS,
     STATE,
-    Moment,
     PhysicsWarning,
-    clear_of_keys,
+    WorldState,
     finite,
+    reset_pose_after_instability,
     starting_positions,
 )
 
 _NUMBER = 1  # Batch.warning holds (last info, number) of each kind.
 
 
-class WorldBatch(Moment):
+class WorldBatch(WorldState):
     """B worlds that step together; each is what one `World` would be, bit for bit.
 
     Attributes:
@@ -70,7 +70,7 @@ class WorldBatch(Moment):
             ValueError: if `qpos` has another shape or is not finite.
         """
         which = self._which(ids)
-        start = np.broadcast_to(starting_positions(qpos), (len(which), POSITIONS))
+        start = np.broadcast_to(starting_positions(qpos), (len(which), LAYOUT.qpos_size))
         self.blow_ups[which] = 0
         self.pedal[which] = False
         self._put(start, which)
@@ -89,7 +89,7 @@ class WorldBatch(Moment):
         before = self.qpos
         self._batch.bind("ctrl")[:] = wanted
         self.pedal[:] = pedal
-        self._stir_keys()
+        self._keep_pressed_keys_awake()
         self._batch.step(nstep=SUBSTEPS)
         broken = self._broken()
         if len(broken):
@@ -97,7 +97,7 @@ class WorldBatch(Moment):
             if not self.quiet:
                 which = ", ".join(map(str, broken))
                 warnings.warn(f"{BLOW_UP} (worlds {which})", PhysicsWarning, stacklevel=2)
-            self._put(clear_of_keys(before[broken]), broken)
+            self._put(reset_pose_after_instability(before[broken]), broken)
 
     def state(self) -> NDArray[np.float64]:
         """(B, S) the moment of each world, as `World.state`."""

@@ -8,17 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.world.figures import (
-    HAND_ACTUATORS,
-    HAND_JOINTS,
-    KEYS,
-    LEFT_JOINTS,
-    RIGHT_JOINTS,
-)
-from pianomime.world.model import Side, fingertip_sites, hand_model
-
-SIDES: tuple[Side, Side] = ("lh", "rh")
-"""The sides in plan order (left, right)."""
+from pianomime.world.layout import LAYOUT
+from pianomime.world.model import SIDES, Side, fingertip_sites, hand_model
 
 
 class Hand:
@@ -43,10 +34,8 @@ class Hand:
         self.ctrl_low, self.ctrl_high = self.model.actuator_ctrlrange.T.copy()
         self.gain: NDArray[np.float64] = self.model.actuator_gainprm[:, 0].copy()
         self.to_ctrl = self._transmission()
-        self.joints = RIGHT_JOINTS if side == "rh" else LEFT_JOINTS
-        self.actuators = (
-            slice(0, HAND_ACTUATORS) if side == "rh" else slice(HAND_ACTUATORS, 2 * HAND_ACTUATORS)
-        )
+        self.joints = LAYOUT.joints[SIDES.index(side)]
+        self.actuators = LAYOUT.actuators[SIDES.index(side)]
         self._sites = [self.model.site(name).id for name in fingertip_sites(side)]
 
     def points(self, qpos: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -62,14 +51,14 @@ class Hand:
         """The points (6, 3) [m] and their Jacobian (6, 3, 27) at joints (27,)."""
         points = self.points(qpos)
         mujoco.mj_comPos(self.model, self.data)
-        jacobian = np.empty((len(self._sites), 3, HAND_JOINTS))
+        jacobian = np.empty((len(self._sites), 3, LAYOUT.hand_joints))
         for row, site in enumerate(self._sites):
             mujoco.mj_jacSite(self.model, self.data, jacobian[row], None, site)
         return points, jacobian
 
     def _transmission(self) -> NDArray[np.float64]:
         mujoco.mj_forward(self.model, self.data)
-        moment = np.zeros((HAND_ACTUATORS, HAND_JOINTS))
+        moment = np.zeros((LAYOUT.hand_actuators, LAYOUT.hand_joints))
         mujoco.mju_sparse2dense(
             moment,
             self.data.actuator_moment.reshape(-1),
@@ -82,7 +71,7 @@ class Hand:
 
 @cache
 def both_hands() -> tuple[Hand, Hand]:
-    """Left and right, to be looked at: they are everybody's, and stay in no pose."""
+    """Shared hands (left, right), for reading constants only: their pose is not preserved."""
     left, right = SIDES
     return Hand(left), Hand(right)
 
@@ -91,14 +80,13 @@ def hand_points(joints: NDArray[np.floating]) -> NDArray[np.float64]:
     """(B, 2, 6, 3) [m] points of both hands, left first, at joints (B, 54), right then left."""
     points = np.empty((len(joints), 2, 6, 3))
     for index, hand in enumerate(both_hands()):
-        first = hand.joints.start - KEYS
-        for row, pose in enumerate(joints[:, first : first + HAND_JOINTS]):
+        for row, pose in enumerate(joints[:, LAYOUT.among_hands(index)]):
             points[row, index] = hand.points(pose)
     return points
 
 
 def by_actuator(finger: float, wrist: float, slide: float) -> NDArray[np.float64]:
-    """(46,) a figure for the actuators of fingers, one for wrists and one for forearms' slides."""
-    one = np.full(HAND_ACTUATORS, finger)
-    one[:2], one[20:] = wrist, slide
+    """(46,) one value for the actuators of fingers, one for wrists and one for forearm slides."""
+    one = np.full(LAYOUT.hand_actuators, finger)
+    one[LAYOUT.wrist_actuators], one[LAYOUT.slide_actuators] = wrist, slide
     return np.tile(one, 2)

@@ -1,4 +1,4 @@
-"""The MuJoCo model of the piano and the two hands, built from `figures.json`.
+"""The MuJoCo model of the piano and the two hands, built from `parameters.json`.
 
 World frame: origin at the middle of the keyboard, x toward the player, y along the keyboard
 (treble positive), z up; metres. Order of positions: 88 keys, then per hand (right, left)
@@ -13,17 +13,20 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
-from pianomime.world.figures import (
-    BLACK,
-    FIGURES,
-    FINGER_PREFIXES,
-    KEYS,
+from pianomime.keyboard import BLACK, KEYS
+from pianomime.world.parameters import (
+    PARAMETERS,
     PHYSICS_DT,
     key_centres,
     key_half_sizes,
 )
 
 Side = Literal["rh", "lh"]
+
+SIDES: tuple[Side, Side] = ("lh", "rh")
+"""The sides in plan order (left, right)."""
+FINGER_PREFIXES = ("th", "ff", "mf", "rf", "lf")
+"""Names of the fingers in the model, thumb first."""
 
 _GEOM_TYPES = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -71,13 +74,13 @@ def hand_model(side: Side) -> mujoco.MjModel:
 
 def add_piano(spec: mujoco.MjSpec) -> None:
     """Add the 88 keys, each a hinged box, and the piano's base."""
-    figures = FIGURES["keyboard"]
+    parameters = PARAMETERS["keyboard"]
     piano = spec.worldbody.add_body(name="piano")
     piano.add_geom(
         name="piano_base",
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=figures["base"]["pos"],
-        size=figures["base"]["half_size"],
+        pos=parameters["base"]["pos"],
+        size=parameters["base"]["half_size"],
         rgba=(0.15, 0.15, 0.15, 1.0),
         mass=0.0,
         contype=0,
@@ -85,7 +88,7 @@ def add_piano(spec: mujoco.MjSpec) -> None:
     )
     centres, half_sizes = key_centres(), key_half_sizes()
     for key in range(KEYS):
-        colour = figures["black" if BLACK[key] else "white"]
+        colour = parameters["black" if BLACK[key] else "white"]
         hinge = (-half_sizes[key, 0], 0.0, 0.0)
         body = piano.add_body(name=f"key_{key}", pos=centres[key])
         body.add_joint(
@@ -95,10 +98,10 @@ def add_piano(spec: mujoco.MjSpec) -> None:
             pos=hinge,
             range=colour["range"],
             limited=mujoco.mjtLimited.mjLIMITED_TRUE,
-            stiffness=_first_order(figures["joint"]["stiffness"]),
-            springref=figures["joint"]["springref"],
-            damping=_first_order(figures["joint"]["damping"]),
-            armature=figures["joint"]["armature"],
+            stiffness=_first_order(parameters["joint"]["stiffness"]),
+            springref=parameters["joint"]["springref"],
+            damping=_first_order(parameters["joint"]["damping"]),
+            armature=parameters["joint"]["armature"],
         )
         body.add_geom(
             name=f"key_{key}",
@@ -106,46 +109,49 @@ def add_piano(spec: mujoco.MjSpec) -> None:
             size=half_sizes[key],
             mass=colour["mass"],
             rgba=(0.1, 0.1, 0.1, 1.0) if BLACK[key] else (0.95, 0.95, 0.93, 1.0),
-            **figures["contact"],
+            **parameters["contact"],
             **_KEY_MASK,
         )
 
 
 def add_hand(spec: mujoco.MjSpec, side: Side) -> None:
     """Add one hand with its sliding forearm; the left is the right mirrored in its x axis."""
-    hand = FIGURES["hand"]
+    hand = PARAMETERS["hand"]
     mirror = -1.0 if side == "lh" else 1.0
     bodies: dict[str, mujoco.MjsBody] = {}
-    for shape, vertices in FIGURES["fingertip_hulls"].items():
+    for shape, vertices in PARAMETERS["fingertip_hulls"].items():
         spec.add_mesh(name=f"{side}_{shape}_tip", uservert=np.ravel(vertices))
-    for figures in hand["bodies"]:
-        name = figures["name"]
-        if figures["parent"] is None:
+    for parameters in hand["bodies"]:
+        name = parameters["name"]
+        if parameters["parent"] is None:
             parent, pos, quat = spec.worldbody, _FOREARM_BASE[side], _FOREARM_QUAT
         else:
-            parent = bodies[figures["parent"]]
-            pos, quat = _mirror_pos(figures["pos"], mirror), _mirror_quat(figures, "quat", mirror)
+            parent = bodies[parameters["parent"]]
+            pos, quat = (
+                _mirror_pos(parameters["pos"], mirror),
+                _mirror_quat(parameters, "quat", mirror),
+            )
         body = parent.add_body(
             name=f"{side}_{name}",
             pos=pos,
             quat=quat,
-            mass=figures["mass"],
-            ipos=_mirror_pos(figures["com"], mirror),
-            iquat=_mirror_quat(figures, "inertia_quat", mirror),
-            inertia=figures["inertia"],
+            mass=parameters["mass"],
+            ipos=_mirror_pos(parameters["com"], mirror),
+            iquat=_mirror_quat(parameters, "inertia_quat", mirror),
+            inertia=parameters["inertia"],
             explicitinertial=True,
             gravcomp=1.0,
         )
         bodies[name] = body
-        for joint in figures["joints"]:
+        for joint in parameters["joints"]:
             _add_joint(body, joint, side, mirror)
         reaches = not name.endswith(_OUT_OF_REACH)
-        for geom in figures["geoms"]:
+        for geom in parameters["geoms"]:
             _add_geom(body, geom, side, mirror, reaches)
-        if "fingertip" in figures:
+        if "fingertip" in parameters:
             body.add_site(
                 name=f"{side}_{name.removesuffix('distal')}_tip",
-                pos=_mirror_pos(figures["fingertip"], mirror),
+                pos=_mirror_pos(parameters["fingertip"], mirror),
             )
         if name == "wrist":
             body.add_site(name=f"{side}_wrist")
@@ -166,7 +172,7 @@ def fingertip_sites(side: Side) -> list[str]:
 
 def _empty_spec() -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
-    physics = FIGURES["physics"]
+    physics = PARAMETERS["physics"]
     spec.option.timestep = PHYSICS_DT
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
@@ -187,66 +193,66 @@ def _empty_spec() -> mujoco.MjSpec:
     return spec
 
 
-def _add_joint(body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float) -> None:
-    slide = figures.get("type") == "slide"
-    x, y, z = figures["axis"]
+def _add_joint(body: mujoco.MjsBody, parameters: dict[str, Any], side: Side, mirror: float) -> None:
+    slide = parameters.get("type") == "slide"
+    x, y, z = parameters["axis"]
     # Forearms slide along the same world axes on both sides; a mirrored hinge axis turns round.
     axis = (x, y, z) if slide else (x, mirror * y, mirror * z)
     body.add_joint(
-        name=f"{side}_{figures['name']}",
+        name=f"{side}_{parameters['name']}",
         type=mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE,
         axis=axis,
-        range=_range(figures, figures["name"], side),
+        range=_range(parameters, parameters["name"], side),
         limited=mujoco.mjtLimited.mjLIMITED_TRUE,
-        damping=_first_order(figures["damping"]),
-        **FIGURES["hand"]["joint"],
+        damping=_first_order(parameters["damping"]),
+        **PARAMETERS["hand"]["joint"],
     )
 
 
 def _add_geom(
-    body: mujoco.MjsBody, figures: dict[str, Any], side: Side, mirror: float, reaches: bool
+    body: mujoco.MjsBody, parameters: dict[str, Any], side: Side, mirror: float, reaches: bool
 ) -> None:
     look = {"rgba": (0.25, 0.27, 0.32, 1.0), "group": 2}
-    contact = {**FIGURES["hand"]["contact"], **(_HAND_MASK if reaches else _NO_CONTACT)}
-    if figures["type"] == "hull":
+    contact = {**PARAMETERS["hand"]["contact"], **(_HAND_MASK if reaches else _NO_CONTACT)}
+    if parameters["type"] == "hull":
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=f"{side}_{figures['hull']}_tip",
+            meshname=f"{side}_{parameters['hull']}_tip",
             **contact,
             **look,
         )
         return
-    size = [*figures["size"], 0.0, 0.0][:3]
+    size = [*parameters["size"], 0.0, 0.0][:3]
     body.add_geom(
-        type=_GEOM_TYPES[figures["type"]],
+        type=_GEOM_TYPES[parameters["type"]],
         size=size,
-        pos=_mirror_pos(figures["pos"], mirror),
-        quat=_mirror_quat(figures, "quat", mirror),
+        pos=_mirror_pos(parameters["pos"], mirror),
+        quat=_mirror_quat(parameters, "quat", mirror),
         **contact,
         **look,
     )
 
 
-def _add_actuator(spec: mujoco.MjSpec, figures: dict[str, Any], side: Side) -> None:
-    kind = "joint" if "joint" in figures else "tendon"
-    gain = figures["kp"]
+def _add_actuator(spec: mujoco.MjSpec, parameters: dict[str, Any], side: Side) -> None:
+    kind = "joint" if "joint" in parameters else "tendon"
+    gain = parameters["kp"]
     actuator = spec.add_actuator(
-        name=f"{side}_{figures[kind]}",
+        name=f"{side}_{parameters[kind]}",
         trntype=getattr(mujoco.mjtTrn, f"mjTRN_{kind.upper()}"),
-        target=f"{side}_{figures[kind]}",
+        target=f"{side}_{parameters[kind]}",
         gainprm=[gain, *[0.0] * 9],
         biasprm=[0.0, -gain, *[0.0] * 8],
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         ctrllimited=mujoco.mjtLimited.mjLIMITED_TRUE,
-        ctrlrange=_range(figures, figures[kind], side),
+        ctrlrange=_range(parameters, parameters[kind], side),
     )
-    if "force" in figures:
+    if "force" in parameters:
         actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        actuator.forcerange = (-figures["force"], figures["force"])
+        actuator.forcerange = (-parameters["force"], parameters["force"])
 
 
-def _range(figures: dict[str, Any], joint: str, side: Side) -> tuple[float, float]:
-    low, high = figures["range"]
+def _range(parameters: dict[str, Any], joint: str, side: Side) -> tuple[float, float]:
+    low, high = parameters["range"]
     # tx is the same world direction on both sides, so its range is mirrored.
     return (-high, -low) if side == "lh" and joint == "forearm_tx" else (low, high)
 
@@ -256,9 +262,9 @@ def _mirror_pos(pos: list[float], mirror: float) -> tuple[float, float, float]:
 
 
 def _mirror_quat(
-    figures: dict[str, Any], name: str, mirror: float
+    parameters: dict[str, Any], name: str, mirror: float
 ) -> tuple[float, float, float, float]:
-    w, x, y, z = figures.get(name, (1.0, 0.0, 0.0, 0.0))
+    w, x, y, z = parameters.get(name, (1.0, 0.0, 0.0, 0.0))
     return (w, x, mirror * y, mirror * z)
 
 

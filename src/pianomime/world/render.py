@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pianomime.files import atomic
-from pianomime.world.figures import KEYS
+from pianomime.keyboard import KEYS
 from pianomime.world.model import build_spec
 from pianomime.world.scene_look import CAMERAS, LAMP_OFF, dress, key_colours
 

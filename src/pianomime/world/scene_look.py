@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.world.figures import BLACK, KEYS, key_centres
+from pianomime.keyboard import BLACK, KEYS
+from pianomime.world.parameters import key_centres
 
 CAMERAS = ("player", "top", "side")
 """Names of the cameras: over the player's shoulders, straight down, from the treble end."""

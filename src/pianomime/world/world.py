@@ -8,21 +8,21 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.world.figures import SUBSTEPS
 from pianomime.world.model import fingertip_sites, world_model
-from pianomime.world.moment import (
+from pianomime.world.parameters import SUBSTEPS
+from pianomime.world.state import (
     BLOW_UP,
     RESETS,
     STATE,
-    Moment,
     PhysicsWarning,
-    clear_of_keys,
+    WorldState,
     finite,
+    reset_pose_after_instability,
     starting_positions,
 )
 
 
-class World(Moment):
+class World(WorldState):
     """Piano, two hands and the pedal. Deterministic: same controls, same states, bit for bit.
 
     Attributes:
@@ -75,13 +75,13 @@ class World(Moment):
         before = self.data.qpos.copy()
         self.data.ctrl[:] = wanted
         self.pedal = bool(pedal)
-        self._stir_keys()
+        self._keep_pressed_keys_awake()
         mujoco.mj_step(self.model, self.data, nstep=SUBSTEPS)
         if self._broken():
             self.blow_ups += 1
             if not self.quiet:
                 warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=2)
-            self._put(clear_of_keys(before))
+            self._put(reset_pose_after_instability(before))
 
     def state(self) -> NDArray[np.float64]:
         """(S,) the moment as numbers, for `set_state` of any World or WorldBatch.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pianomime.errors import InputError
-from pianomime.learn.config_check import above_zero, within
+from pianomime.learn.runs.validation import above_zero, within
 
 
 @dataclass(frozen=True)

@@ -12,24 +12,24 @@ import numpy as np
 import torch
 from stable_baselines3.common.logger import Logger
 
-from pianomime.generalist.fingers import SIZE, FingerTracker
-from pianomime.generalist.methods import FINGERS
-from pianomime.learn.boundary import Boundary
-from pianomime.learn.config_check import within
+from pianomime.learn.envs.checkpoint_callback import ResumableCallback
+from pianomime.learn.envs.reference import load_score
+from pianomime.learn.expert.ppo_model import Ppo, actor_network
 from pianomime.learn.fingers.config import FingersConfig, check_fingers
-from pianomime.learn.fingers.fingers_env import AGENTS, FingersVecEnv, PlannedSong
-from pianomime.learn.fit_folder import FitFolder
-from pianomime.learn.generalist.export import export_network
-from pianomime.learn.ppo_model import Ppo, actor_network
-from pianomime.learn.run_log import RunLog
-from pianomime.learn.song import load_score
-from pianomime.learn.stage_folder import stage_folder
-from pianomime.learn.tell import Tell
-from pianomime.learn.torch_threads import torch_threads
-from pianomime.play import Player
-from pianomime.song_files import find_songs
+from pianomime.learn.fingers.env import AGENTS, FingersVecEnv, PlannedSong
+from pianomime.learn.imitation.export import export_network
+from pianomime.learn.runs.fit_folder import FitFolder
+from pianomime.learn.runs.log import RunLog
+from pianomime.learn.runs.stage_folder import stage_folder
+from pianomime.learn.runs.tell import Tell
+from pianomime.learn.runs.torch_threads import torch_threads
+from pianomime.learn.runs.validation import within
+from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
+from pianomime.players.player import Player
+from pianomime.policies.finger_residual import SIZE, FingerResidualTracker
+from pianomime.policies.methods import FINGERS
+from pianomime.songs.find import find_songs
 from pianomime.track import DynamicTracker, Tracker
-from pianomime.video.demonstration import Demonstration, DemonstrationPlanner
 
 _MEASURED = 8
 """Songs that are kept from training, by which it is seen how well it goes."""
@@ -119,7 +119,7 @@ def _model(env: FingersVecEnv, config: FingersConfig) -> Ppo:
     )
 
 
-class _Boundary(Boundary):
+class _Boundary(ResumableCallback):
     """Tells, and writes a checkpoint every now and then."""
 
     def __init__(
@@ -135,7 +135,7 @@ class _Boundary(Boundary):
         self._log, self._tell = log, tell
 
     def keep(self, update: int, steps: int) -> None:
-        """As `Boundary.keep`."""
+        """As `ResumableCallback.keep`."""
         if update % _CHECKPOINT == 0 and update:
             self._folder.checkpoint(self.arrays(), steps)
 
@@ -160,7 +160,7 @@ def _measure(songs: list[PlannedSong], network: torch.nn.Module) -> dict[str, fl
             name: float(np.mean([_f1(song.demonstration, tracker) for song in songs]))
             for name, tracker in (
                 ("unseen/f1_without", DynamicTracker()),
-                ("unseen/f1", FingerTracker(run)),
+                ("unseen/f1", FingerResidualTracker(run)),
             )
         }
 

@@ -13,8 +13,8 @@ from typing import cast
 import torch
 from torch import Tensor, nn
 
+from pianomime.keyboard import KEYS
 from pianomime.learn.goal.sdf import QUERY_HIGH, QUERY_LOW
-from pianomime.music import KEYS
 
 CODE = 16
 """Numbers in a code."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pianomime.learn.config_check import within
-from pianomime.learn.fit_config import FitConfig, check_fit
+from pianomime.learn.imitation.trainer_config import TrainerConfig, check_fit
+from pianomime.learn.runs.validation import within
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class GoalConfig:
     """Semitones by which a goal is moved at most, either way, when it is drawn."""
     unseen: float = 0.1
     """Share of the MIDI files that is kept for measuring."""
-    fit: FitConfig = field(
+    fit: TrainerConfig = field(
         # In bfloat16, distances would be some 5 mm wide.
-        default_factory=lambda: FitConfig(steps=60_000, learning_rate=1e-3, bfloat16=False)
+        default_factory=lambda: TrainerConfig(steps=60_000, learning_rate=1e-3, bfloat16=False)
     )
 
 

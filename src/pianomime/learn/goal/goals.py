@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.keyboard import KEYS
 from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.sdf import QUERY_HIGH, QUERY_LOW
-from pianomime.learn.tell import Tell
-from pianomime.music import KEYS, Score
-from pianomime.song_files import find_songs
+from pianomime.learn.runs.tell import Tell
+from pianomime.music import Score
+from pianomime.songs.find import find_songs
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pianomime.files import atomic
+from pianomime.keyboard import KEYS
 from pianomime.learn.goal.autoencoder import GoalEncoder
 from pianomime.learn.goal.sdf import chamfer
-from pianomime.music import KEYS
 
 _SHOWN = 3000
 _COMPARED = 600

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from pianomime.world.figures import key_centres, key_half_sizes
+from pianomime.world.parameters import key_centres, key_half_sizes
 
 KEYBOARD = float(key_centres()[-1, 1] - key_centres()[0, 1] + 2 * key_half_sizes()[0, 1])
 """[m] Length of the keyboard, 1.221. No distance is longer: a goal of silence is as far as that

@@ -13,14 +13,14 @@ from scipy.stats import spearmanr
 from torch import Tensor, nn
 
 from pianomime.errors import InputError
-from pianomime.learn.fit import Batch, fit, load_arrays
 from pianomime.learn.goal.autoencoder import GoalAutoencoder, GoalEncoder
 from pianomime.learn.goal.config import GoalConfig, check_goal
 from pianomime.learn.goal.goals import GoalDraw, Goals, GoalSplit, read_goals
 from pianomime.learn.goal.picture import draw_codes
 from pianomime.learn.goal.sdf import KEYBOARD, QUERY_HIGH, QUERY_LOW, chamfer, distance
-from pianomime.learn.tell import Tell
-from pianomime.learn.tensors import read_tensors, write_tensors
+from pianomime.learn.imitation.trainer import Batch, fit, load_arrays
+from pianomime.learn.runs.safetensors_file import read_tensors, write_tensors
+from pianomime.learn.runs.tell import Tell
 
 _RESULT = "goal.safetensors"
 _VERSION = 1

@@ -16,24 +16,24 @@ from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
 from pianomime.errors import InputError
-from pianomime.generalist.features import CONTROLS, TIPS, holding, low_inputs
-from pianomime.generalist.horizon import CHUNK
-from pianomime.learn.boundary import Boundary
-from pianomime.learn.config_check import within
-from pianomime.learn.fit_folder import FitFolder
-from pianomime.learn.generalist.export import export_network
-from pianomime.learn.generalist.scale import Scale
-from pianomime.learn.reward import press_reward
-from pianomime.learn.run_log import RunLog
+from pianomime.keyboard import KEYS
+from pianomime.learn.envs.checkpoint_callback import ResumableCallback
+from pianomime.learn.envs.reference import load_score
+from pianomime.learn.envs.reward import press_reward
+from pianomime.learn.envs.sb3_multi_song import Played, Sb3MultiSongEnv
+from pianomime.learn.imitation.export import export_network
+from pianomime.learn.imitation.normalizer import Scale
+from pianomime.learn.runs.fit_folder import FitFolder
+from pianomime.learn.runs.log import RunLog
+from pianomime.learn.runs.safetensors_file import Arrays
+from pianomime.learn.runs.stage_folder import stage_folder
+from pianomime.learn.runs.tell import Tell
+from pianomime.learn.runs.validation import within
 from pianomime.learn.sac.config import SacConfig, check_sac
-from pianomime.learn.song import load_score
-from pianomime.learn.songs_vec_env import Played, SongsVecEnv
-from pianomime.learn.stage_folder import stage_folder
-from pianomime.learn.tell import Tell
-from pianomime.learn.tensors import Arrays
 from pianomime.music import Score
-from pianomime.song_files import find_songs
-from pianomime.world.figures import KEYS
+from pianomime.policies.features import CONTROLS, TIPS, holding, low_inputs
+from pianomime.policies.horizon import CHUNK
+from pianomime.songs.find import find_songs
 from pianomime.world.hand import by_actuator, hand_points
 
 STAGE = "multi-task-sac"
@@ -66,7 +66,7 @@ class AskedSong:
         return cls(score.roll(), score.pedal_roll())
 
 
-class SacVecEnv(SongsVecEnv):
+class SacVecEnv(Sb3MultiSongEnv):
     """Both hands of a world are one agent, which sees what a policy of one stage sees.
 
     Attributes:
@@ -86,7 +86,7 @@ class SacVecEnv(SongsVecEnv):
         super().__init__(songs, config.worlds, 1, CHUNK * KEYS + _VECTOR, CONTROLS, threads)
 
     def see(self) -> NDArray[np.float32]:
-        """As `SongsVecEnv.see`."""
+        """As `Sb3MultiSongEnv.see`."""
         joints = self.worlds.qpos_hands
         self._holding = holding(joints)
         goal = np.array([self._goals[song][at : at + CHUNK] for song, at in self.rows.tolist()])
@@ -98,12 +98,12 @@ class SacVecEnv(SongsVecEnv):
         return told[:, None]
 
     def controls(self, said: NDArray[Any]) -> NDArray[np.float64]:
-        """As `SongsVecEnv.controls`."""
+        """As `Sb3MultiSongEnv.controls`."""
         ctrl: NDArray[np.float64] = self._holding + STEPS * said[:, 0]
         return ctrl
 
     def rewards(self, played: Played, said: NDArray[Any]) -> NDArray[np.float64]:
-        """As `SongsVecEnv.rewards`: the paper's for keys; there are no fingertips to mimic."""
+        """As `Sb3MultiSongEnv.rewards`: the paper's for keys; there are no fingertips to mimic."""
         reward = press_reward(played.key_state, played.pressed, played.wanted, _HIT)
         return reward[:, None]
 
@@ -191,7 +191,7 @@ def train_sac(
     return result
 
 
-class _Boundary(Boundary):
+class _Boundary(ResumableCallback):
     """Tells how far it is and how much reward there was, and writes a checkpoint now and then."""
 
     def __init__(
@@ -214,7 +214,7 @@ class _Boundary(Boundary):
         return self.model
 
     def arrays(self) -> Arrays:
-        """As `Boundary.arrays`, with all frames that are remembered."""
+        """As `ResumableCallback.arrays`, with all frames that are remembered."""
         model, kept = self._learner, self._learner.replay_buffer
         assert kept is not None
         assert model.log_ent_coef is not None
@@ -228,7 +228,7 @@ class _Boundary(Boundary):
         }
 
     def optimizers(self) -> dict[str, torch.optim.Optimizer]:
-        """As `Boundary.optimizers`."""
+        """As `ResumableCallback.optimizers`."""
         model = self._learner
         assert model.ent_coef_optimizer is not None
         return {
@@ -238,7 +238,7 @@ class _Boundary(Boundary):
         }
 
     def resume(self, arrays: Arrays, steps: int, path: Path) -> None:
-        """As `Boundary.resume`."""
+        """As `ResumableCallback.resume`."""
         super().resume(arrays, steps, path)
         model, kept = self._learner, self._learner.replay_buffer
         assert kept is not None
@@ -254,7 +254,7 @@ class _Boundary(Boundary):
         kept.full = len(rows) == kept.buffer_size
 
     def keep(self, update: int, steps: int) -> None:
-        """As `Boundary.keep`."""
+        """As `ResumableCallback.keep`."""
         self._rewards = []
         if update:
             self._folder.checkpoint(self.arrays(), steps)

@@ -1,0 +1,121 @@
+"""Whether every player still plays as it did, bit for bit.
+
+Plays the bundled songs, and three pieces of Etude-12 and three modern clips more where
+PIANOMIME_SHARED names reference data, at effort 0 with every player that comes with the program,
+and compares the controls and the F1 with those in digest.json. Controls are compared bit for bit,
+which holds on one kind of processor with one set of libraries (constraints.txt); `--f1` compares
+the F1 alone.
+
+    python benchmarks/digest.py              # compare; exit code 1 where something differs
+    python benchmarks/digest.py --f1         # the F1 alone, within 0.003
+    python benchmarks/digest.py --write      # make digest.json anew
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import NamedTuple
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import pianomime
+from common import cores, parser
+from pianomime import songs
+from pianomime.files import atomic
+
+STORED = Path(__file__).with_name("digest.json")
+PLAYERS = ("zero-shot", "zero-shot-ik", "fingers", "two-stage-diff", "two-stage-mse")
+DEMONSTRATION_PLAYERS = ("demonstration", "demonstration-ik")
+REFERENCE = ("etude12", "modern/test12")
+TOLERANCE = 0.003
+"""Of the F1, for machines on which the controls differ in the last bit."""
+
+
+class Job(NamedTuple):
+    """One song for one player."""
+
+    player: str
+    effort: int
+    song: str
+    path: str
+    seconds: float
+
+    @property
+    def name(self) -> str:
+        """As it is called in the file."""
+        return f"{self.player} effort {self.effort}: {self.song}, {self.seconds:g} s"
+
+
+def jobs(shared: Path | None) -> list[Job]:
+    """All that is played."""
+    pieces = {name: str(songs.path(name)) for name in songs.names()}
+    bundled = list(pieces)
+    for folder in REFERENCE if shared is not None else ():
+        pieces |= {
+            file.stem: str(file) for file in sorted((shared / "data" / folder).glob("*.mid"))[:3]
+        }
+    made = [Job(player, 0, name, path, 30.0) for player in PLAYERS for name, path in pieces.items()]
+    made += [Job("zero-shot", 1, name, pieces[name], 15.0) for name in bundled[:2]]
+    if shared is not None:
+        clip = str(shared / "data" / "stan" / "reference.npz")
+        made += [Job(player, 0, "Stan_1", clip, 30.0) for player in DEMONSTRATION_PLAYERS]
+    return made
+
+
+def play(job: Job) -> dict[str, str | float]:
+    """The digest of the controls, and the F1."""
+    warnings.simplefilter("ignore")
+    if job.path.endswith(".npz"):
+        from pianomime.learn.data.published import read_published
+
+        demonstration, _ = next(iter(read_published(Path(job.path))))
+        demonstration = demonstration.excerpt(0.0, job.seconds)
+        player = pianomime.Player.from_demonstration(demonstration, job.player, job.effort)
+        score = demonstration.score
+    else:
+        player = pianomime.Player.from_name(job.player, job.effort)
+        score = pianomime.excerpt(pianomime.Score.from_midi(job.path), seconds=job.seconds)
+    performance = player.play(score)
+    digest = hashlib.sha256(performance.ctrl.tobytes()).hexdigest()[:16]
+    return {"controls": digest, "f1": round(performance.metrics()["f1"], 6)}
+
+
+def main() -> int:
+    """Play, then compare or write."""
+    arguments = parser("digest", __doc__)
+    arguments.add_argument("--write", action="store_true", help="make digest.json anew")
+    arguments.add_argument("--f1", action="store_true", help="compare the F1 alone")
+    asked = arguments.parse_args()
+    folder = os.environ.get("PIANOMIME_SHARED")
+    todo = jobs(Path(folder) if folder and Path(folder).is_dir() else None)
+    stored = json.loads(STORED.read_text("utf-8")) if STORED.exists() else {}
+    found, wrong = {}, 0
+    with ProcessPoolExecutor(len(cores()), get_context("spawn")) as pool:
+        for job, row in zip(todo, pool.map(play, todo), strict=True):
+            found[job.name] = row
+            known = stored.get(job.name)
+            if known is None:
+                verdict = "new"
+            elif asked.f1:
+                verdict = "as before" if abs(known["f1"] - row["f1"]) <= TOLERANCE else "DIFFERS"
+            else:
+                verdict = "as before" if known == row else f"DIFFERS from {known}"
+            wrong += verdict.startswith("DIFFERS") or (verdict == "new" and not asked.write)
+            print(f"{row['controls']}  {row['f1']:.6f}  {verdict}  {job.name}", flush=True)
+    if asked.write:
+        with atomic(STORED) as temporary:
+            temporary.write_text(json.dumps({**stored, **found}, indent=1) + "\n", "utf-8")
+        return 0
+    print(f"{len(found) - wrong} of {len(found)} as before")
+    return int(wrong > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Scoring: many songs at a time, and why notes of a performance went wrong."""

@@ -1,0 +1,286 @@
+"""Scoring many songs: in parallel, resumable, and going on when one of them fails."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import math
+import os
+import queue
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import pianomime
+from pianomime.errors import InputError
+from pianomime.evaluation.song_worker import SongWorker
+from pianomime.files import atomic
+from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.players.player import EFFORT, Player, check_player
+from pianomime.policies.methods import weight_files
+from pianomime.songs.find import find_songs
+
+Row = dict[str, Any]
+"""The numbers of one song (see `pianomime.evaluation.summary`) and its `causes` (see
+`pianomime.evaluation.diagnose.frames_by_cause`, if the player plans), or `song` and `error`."""
+
+# Those that decide how a song is played.
+_LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy", "symusic")
+
+Progress = Callable[[int, int, float], None]
+"""Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
+
+
+def evaluate(
+    paths: str | Path | Iterable[str | Path],
+    player: str = "zero-shot",
+    seconds: float = EXCERPT_SECONDS,
+    jobs: int | None = None,
+    out: str | Path | None = None,
+    progress: Progress | None = None,
+    effort: int = EFFORT,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Play and score songs, several at a time, each in a process of its own.
+
+    A song that fails becomes a row with an `error`, and the others go on. With a folder `out`,
+    a song that was finished there before by the same player and program is not played again, so
+    a run that was interrupted, however hard, goes on where it was.
+
+    Args:
+        paths: MIDI files, folders of them, or names of bundled songs.
+        player: name of the player.
+        seconds: how much of each song to play at most, from its first note [s].
+        jobs: processes; one a core that this one may use if None. They share the cores, so
+            `realtime_factor` and the times depend on it.
+        out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
+        progress: told how far it is.
+        effort: how hard the player tries, 0 to 3.
+        seed: of what it draws.
+
+    Returns:
+        What `results.json` holds: `player`, `effort`, `seed` and `seconds` as asked for (None:
+        whole songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was
+        measured, over the songs that did not fail; empty if all did) and `causes` (`missed` and
+        `wrong`: the share of the key-frames wanted in all songs that each cause cost, the
+        costliest first).
+
+    Raises:
+        InputError: a path stands for no song, or there is no such player, or its weights cannot be
+            read.
+        OSError: `out` cannot be written.
+    """
+    songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
+    check_player(player, effort)
+    if not seconds > 0:
+        raise InputError(f"seconds must be more than 0, not {seconds:g}")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs must be 1 or more, not {jobs}")
+    if seed < 0:
+        raise InputError(f"seed must be 0 or more, not {seed}")
+    weights = weight_files(player)
+    if weights:  # Whether they can be read is told here, once.
+        Player.from_name(player, effort, seed)
+    setting = f"{player} {effort} {seconds:g} {seed} {_digest(weights)}"
+    store = None if out is None else _Store(Path(out), setting)
+
+    rows: dict[Path, Row] = {}
+
+    def tell() -> None:
+        if progress is not None:
+            f1 = [row["f1"] for row in rows.values() if "error" not in row]
+            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else math.nan)
+
+    tell()
+
+    waiting = []
+    for song in songs:
+        known = None if store is None else store.get(song)
+        if known is None:
+            waiting.append(song)
+        else:
+            rows[song] = known
+            tell()
+    with closing(_play_all(waiting, player, effort, seconds, seed, jobs or _cores())) as played:
+        for song, row in played:
+            if store is not None and "error" not in row:
+                store.put(song, row)
+            rows[song] = row
+            tell()
+
+    results = {
+        "player": player,
+        "effort": effort,
+        "seed": seed,
+        "seconds": seconds if math.isfinite(seconds) else None,
+        "songs": [rows[song] for song in songs],
+        "mean": _mean(list(rows.values())),
+        "causes": _causes(list(rows.values())),
+    }
+    if store is not None:
+        store.close(results)
+    return results
+
+
+def markdown(results: dict[str, Any]) -> str:
+    """The results as Markdown: a table of songs and their means, and one of causes.
+
+    Args:
+        results: what `evaluate` returns.
+    """
+    columns = ("f1", "precision", "recall", "onset_f1", "pedal_f1", "realtime_factor")
+    lines = [
+        "| song | F1 | precision | recall | onset F1 | pedal F1 | real time | left out | broke |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+
+    def cells(row: Row) -> list[str]:
+        return [f"{row[name]:.3f}" for name in columns[:-1]] + [f"{row[columns[-1]]:.1f}x"]
+
+    for row in results["songs"]:
+        # A bar in a title or an error would end the cell.
+        song = str(row["song"]).replace("|", "\\|")
+        if "error" in row:
+            error = str(row["error"]).replace("|", "\\|")
+            lines.append(f"| {song} | failed: {error} | | | | | | | |")
+        else:
+            whole = f"{row['dropped_notes']}/{row['notes']} | {row['blow_ups']}"
+            lines.append(f"| {song} | {' | '.join(cells(row))} | {whole} |")
+    mean = results["mean"]
+    if mean:
+        whole = f"{mean['dropped_notes']:.1f}/{mean['notes']:.1f} | {mean['blow_ups']:.1f}"
+        lines.append(f"| **mean** | {' | '.join(cells(mean))} | {whole} |")
+    causes = [
+        (share, kind, cause)
+        for kind, shares in results["causes"].items()
+        for cause, share in shares.items()
+    ]
+    if causes:
+        lines += ["", "| cause | | of the key-frames wanted |", "| --- | --- | ---: |"]
+        lines += [
+            f"| {cause} | {kind} | {share:.2%} |" for share, kind, cause in sorted(causes)[::-1]
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _mean(rows: list[Row]) -> dict[str, float]:
+    """Mean of every number over the rows without an error."""
+    good = [row for row in rows if "error" not in row]
+    if not good:
+        return {}
+    names = [name for name, value in good[0].items() if isinstance(value, int | float)]
+    names.remove("effort")
+    return {name: round(sum(row[name] for row in good) / len(good), 6) for name in names}
+
+
+def _causes(rows: list[Row]) -> dict[str, dict[str, float]]:
+    """Share of the key-frames wanted that each cause cost, over all songs together."""
+    known = [row["causes"] for row in rows if "causes" in row]
+    wanted = max(sum(causes["wanted"] for causes in known), 1)
+    shares = {}
+    for kind in ("missed", "wrong"):
+        frames: Counter[str] = Counter()
+        for causes in known:
+            frames.update(causes[kind])
+        shares[kind] = {cause: round(count / wanted, 6) for cause, count in frames.most_common()}
+    return shares
+
+
+class _Store:
+    """Finished songs in a folder: one file each, written whole, named by what made it."""
+
+    def __init__(self, out: Path, setting: str) -> None:
+        if out.exists() and not out.is_dir():
+            raise InputError(f"{out}: is a file; a folder is needed")
+        self._out = out
+        self._songs = out / "songs"
+        self._songs.mkdir(parents=True, exist_ok=True)
+        self._made_by = f"{setting} {_program_hash()}".encode()
+
+    def get(self, song: Path) -> Row | None:
+        try:
+            row: Row = json.loads(self._file(song).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return row
+
+    def put(self, song: Path, row: Row) -> None:
+        self._write(self._file(song), _json(row))
+
+    def close(self, results: dict[str, Any]) -> None:
+        self._write(self._out / "results.json", _json(results))
+        self._write(self._out / "results.md", markdown(results))
+
+    def _file(self, song: Path) -> Path:
+        digest = hashlib.sha256(self._made_by)
+        digest.update(song.read_bytes())
+        return self._songs / f"{song.stem}-{digest.hexdigest()[:16]}.json"
+
+    @staticmethod
+    def _write(path: Path, text: str) -> None:
+        with atomic(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _program_hash() -> str:
+    """Changes with our code, its figures and its libraries, so that no older result is reused."""
+    digest = hashlib.sha256()
+    for library in _LIBRARIES:
+        with contextlib.suppress(PackageNotFoundError):  # Not all are in every installation.
+            digest.update(f"{library} {version(library)} ".encode())
+    files = sorted(Path(pianomime.__file__).parent.rglob("*"))
+    digest.update(_digest(file for file in files if file.suffix in (".py", ".json")).encode())
+    return digest.hexdigest()
+
+
+def _digest(files: Iterable[Path]) -> str:
+    """Changes with the content of files."""
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def _cores() -> int:
+    """The cores that this process may run on."""
+    if hasattr(os, "sched_getaffinity"):  # Linux; a container often allows fewer than there are.
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _play_all(
+    songs: list[Path], player: str, effort: int, seconds: float, seed: int, jobs: int
+) -> Generator[tuple[Path, Row], None, None]:
+    """Songs with their rows, in the order in which they finish."""
+    if not songs:
+        return
+    idle: queue.SimpleQueue[SongWorker] = queue.SimpleQueue()
+    workers = [SongWorker(player, effort, seconds, seed) for _ in range(min(jobs, len(songs)))]
+    for worker in workers:
+        idle.put(worker)
+
+    def play(song: Path) -> tuple[Path, Row]:
+        worker = idle.get()
+        try:
+            return song, worker.play(song)
+        finally:
+            idle.put(worker)
+
+    # The threads only wait for the processes.
+    threads = ThreadPoolExecutor(len(workers))
+    try:
+        for future in as_completed([threads.submit(play, song) for song in songs]):
+            yield future.result()
+    finally:
+        threads.shutdown(wait=False, cancel_futures=True)
+        for worker in workers:
+            worker.close()

@@ -1,0 +1,39 @@
+"""The piano's keyboard and the clock of everything that is played on it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+KEYS = 88
+"""Number of keys; key 0 is A0, key 87 is C8."""
+
+LOWEST_PITCH = 21
+"""MIDI pitch of key 0."""
+
+FRAME_RATE = 20.0
+"""Frames a second: one frame is one control step (paper, section 4)."""
+
+FRAME_SECONDS = 1.0 / FRAME_RATE
+"""[s] Length of a frame."""
+
+EXCERPT_SECONDS = 30.0
+"""[s] Length of an excerpt unless told otherwise: the longest clip of the paper's protocol."""
+
+NO_KEY = -1
+"""Stands for no key in arrays of keys."""
+
+_NAMES = ("A", "A♯", "B", "C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯")
+
+BLACK: NDArray[np.bool_] = np.array([len(_NAMES[key % 12]) == 2 for key in range(KEYS)])
+"""(88,) bool: the black keys; read-only."""
+BLACK.setflags(write=False)
+
+
+def key_name(key: int) -> str:
+    """The name of a key with its octave, such as "C♯4"; key 39 is "C4".
+
+    Args:
+        key: 0..87.
+    """
+    return f"{_NAMES[key % 12]}{(key + LOWEST_PITCH) // 12 - 1}"

@@ -1,0 +1,1 @@
+"""Data sets for imitation learning: episodes, DAgger, samples."""

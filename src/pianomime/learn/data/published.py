@@ -1,0 +1,274 @@
+"""Demonstrations from the data that the PianoMime authors published, and from arrays like them.
+
+Known faults are repaired: points that were never seen and stand where the robot rests (z above
+0.1), an older convention for z of pressing fingers, presses that were left over when a hand was not
+found, fingers that press keys nobody asked for, and jumps of single frames.
+
+An .npz file may tell of each clip its `song_group`, its `split`, and whether it is `odd`, of which
+nothing can be learned; such a clip is in the split "odd".
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.archive import read_arrays
+from pianomime.errors import InputError
+from pianomime.keyboard import KEYS, NO_KEY
+from pianomime.music import Score
+from pianomime.plan import FingertipPlan
+from pianomime.plan.demonstration import TRAIN, Demonstration, on_grid
+from pianomime.video.align import HIGH
+from pianomime.video.hands.strays import strays
+from pianomime.video.hands.tracks import at_rest
+from pianomime.world.parameters import key_centres
+
+_ON_KEY = 0.005
+"""[m] along the keyboard from the middle of a key, within which a finger at z = 0 presses it."""
+_NEVER_SEEN = 0.1
+"""[m] z from which a point stands where the robot rests."""
+_JUMP = 0.10
+"""[m] A point this far from where the frames before and after have it was seen wrongly."""
+_WIDTHS = (212, 184)
+"""Columns of the high-level data set's state and action."""
+_TIPS, _FINGERS = 36, 10
+_ODD = "odd"
+
+
+def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demonstration, int]]:
+    """Demonstrations of a data set, one after the other, and how many there are.
+
+    Args:
+        source: a folder with a zarr data set, or an .npz file.
+        most: of them at most.
+
+    Raises:
+        OSError: there is no such file, or it cannot be read.
+        InputError: the data are not of a kind that is known, or none are asked for.
+    """
+    if most is not None and most < 1:
+        raise InputError(f"{most} clips are none: 1 at least are needed")
+    clips = _zarr(source) if source.is_dir() else _npz(source)
+    names = [f"{source.stem}-{number:03d}" for number in range(len(clips))]
+    if len(clips) == 1:
+        names = [source.stem]
+    total = len(clips) if most is None else min(most, len(clips))
+    for clip, name in zip(clips[:total], names, strict=False):
+        made = demonstration_of(clip.fingertips, clip.goal, name, source.name)
+        yield replace(made, song=clip.song, split=clip.split), total
+
+
+def songs_and_splits(
+    path: Path, arrays: dict[str, NDArray[Any]], clips: int
+) -> tuple[list[int], list[str]]:
+    """The song and the split of each clip, as far as a file of clips tells them.
+
+    Args:
+        path: of the file.
+        arrays: `song_group`, `split` and `odd` of each clip, where it has them.
+        clips: how many there are.
+
+    Raises:
+        InputError: they are of another kind or number.
+    """
+    song = arrays.get("song_group", np.full(clips, -1))
+    split = arrays.get("split", np.full(clips, TRAIN))
+    odd = arrays.get("odd", np.zeros(clips, bool))
+    kinds = (song.dtype.kind in "iu", split.dtype.kind == "U", odd.dtype == bool)
+    if not all(kinds) or not song.shape == split.shape == odd.shape == (clips,):
+        raise InputError(
+            f"{path}: song_group, split and odd must be whole numbers, texts and booleans, "
+            "one a clip"
+        )
+    return song.tolist(), np.where(odd, _ODD, split).tolist()
+
+
+def demonstration_of(
+    fingertips: NDArray[np.float64], goal: NDArray[np.bool_] | None, title: str, source: str
+) -> Demonstration:
+    """A demonstration of arrays as PianoMime makes them.
+
+    Args:
+        fingertips: (T, 2, 6, 3) world [m], hands (left, right).
+        goal: (T, 88) keys that should be down; None if only the fingers tell.
+        title: of the piece.
+        source: where it is from.
+    """
+    tips, mended = _mend(np.asarray(fingertips, np.float64))
+    pressing = _pressed(tips)
+    stale = 0
+    if goal is None:
+        down = np.zeros((len(tips), KEYS), bool)
+        frame, hand, finger = np.nonzero(pressing >= 0)
+        down[frame, pressing[frame, hand, finger]] = True
+    else:
+        down = np.asarray(goal, bool)
+        asked = np.take_along_axis(down, np.maximum(pressing, 0).reshape(len(tips), -1), axis=1)
+        wrong = (pressing >= 0) & ~asked.reshape(pressing.shape)
+        stale = int(wrong.sum())
+        pressing[wrong] = NO_KEY
+    score = on_grid(Score.from_roll(down, title=title))
+    frames = score.frames()
+    rows = np.minimum(np.arange(frames), len(tips) - 1)
+    finger_key = pressing[rows].astype(np.int8)
+    finger_key[len(tips) :] = NO_KEY
+    roll = score.roll()
+    # Keys that are due but that no finger presses: the one that presses them before or after.
+    note_hand = np.full(len(score), -1, np.int8)
+    note_finger = note_hand.copy()
+    for note, (first, end) in enumerate(score.note_frames()):
+        often = (finger_key[first:end] == score.key[note]).sum(axis=0)
+        if not often.any():
+            continue
+        hand, finger = np.unravel_index(often.argmax(), often.shape)
+        note_hand[note], note_finger[note] = hand, finger
+        mine = finger_key[first:end, hand, finger]
+        mine[mine == NO_KEY] = score.key[note]
+    finger_key[
+        ~np.take_along_axis(
+            roll, np.maximum(finger_key, 0).reshape(frames, -1).astype(np.int64), axis=1
+        ).reshape(finger_key.shape)
+    ] = NO_KEY
+    points = tips[rows].copy()
+    points[..., 2] = HIGH
+    frame, hand, finger = np.nonzero(finger_key >= 0)
+    points[frame, hand, finger + 1, 1] = key_centres()[finger_key[frame, hand, finger], 1]
+    points[frame, hand, finger + 1, 2] = 0.0
+    return Demonstration(
+        score,
+        FingertipPlan(points, finger_key, note_hand, note_finger),
+        source,
+        quality={
+            "notes": len(score),
+            "notes_without_finger": int((note_hand < 0).sum()),
+            "points_mended": int(mended),
+            "stale_presses": stale,
+        },
+    )
+
+
+def _mend(tips: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
+    """The points with those that were never seen, or seen wrongly, put between their neighbours."""
+    if tips.ndim != 4 or tips.shape[1:] != (2, 6, 3) or not len(tips):
+        raise InputError(f"fingertips must be (T, 2, 6, 3), not {tips.shape}")
+    bad = tips[..., 2] > _NEVER_SEEN
+    for hand, point in np.ndindex(2, 6):
+        bad[:, hand, point] |= strays(tips[:, hand, point, :2], _JUMP)
+    # A finger that presses is where its key is.
+    bad &= tips[..., 2] != 0.0
+    unknown: NDArray[np.bool_] = ~np.all(np.isfinite(tips), axis=3)
+    bad |= unknown
+    mended = tips.copy()
+    time = np.arange(len(tips))
+    for hand, point in np.ndindex(2, 6):
+        wrong = bad[:, hand, point]
+        if wrong.all():
+            mended[unknown[:, hand, point], hand, point] = *at_rest(hand)[point], HIGH
+        elif wrong.any():
+            for axis in range(2):
+                mended[wrong, hand, point, axis] = np.interp(
+                    time[wrong], time[~wrong], tips[~wrong, hand, point, axis]
+                )
+    return mended, int(bad.sum())
+
+
+def _pressed(tips: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(T, 2, 5) the key under each finger whose z says that it presses, -1 for none."""
+    height = tips[:, :, 1:, 2]
+    low = height <= 0.001
+    if not low.any():
+        # Two of the clips have a pressing finger at the middle of its key's box.
+        low = height < 0.03
+    off = np.abs(tips[:, :, 1:, 1, None] - key_centres()[:, 1])
+    nearest = off.argmin(axis=3)
+    return np.where(low & (off.min(axis=3) < _ON_KEY), nearest, NO_KEY)
+
+
+@dataclass(frozen=True, eq=False)
+class _Clip:
+    """Fingertips (T, 2, 6, 3), goals (T, 88) if they are told, and where in its data set it is."""
+
+    fingertips: NDArray[np.float64]
+    goal: NDArray[np.bool_] | None
+    song: int = -1
+    split: str = TRAIN
+
+
+def _npz(path: Path) -> list[_Clip]:
+    arrays = read_arrays(path, "an .npz file of arrays")
+    if "fingertips" not in arrays:
+        raise InputError(f"{path}: holds no fingertips")
+    tips = arrays["fingertips"]
+    if tips.ndim != 4 or tips.shape[1:] != (2, 6, 3) or tips.dtype.kind not in "fiu":
+        raise InputError(f"{path}: fingertips must be numbers (T, 2, 6, 3), not {tips.shape}")
+    goal: NDArray[np.bool_] | None = arrays.get("goal")
+    packed = arrays.get("goal_packed")
+    if packed is not None:
+        if packed.ndim != 2 or packed.dtype != np.uint8:
+            raise InputError(f"{path}: goal_packed must be bytes ({len(tips)}, {(KEYS + 7) // 8})")
+        goal = np.unpackbits(packed, axis=1)[:, :KEYS].astype(bool)
+    if goal is not None and goal.shape != (len(tips), KEYS):
+        raise InputError(f"{path}: goals must be ({len(tips)}, {KEYS}), not {goal.shape}")
+    length = arrays.get("length", np.array([len(tips)]))
+    if length.dtype.kind not in "iu" or length.ndim != 1 or (length < 1).any():
+        raise InputError(f"{path}: the lengths of the clips must be whole numbers from 1 on")
+    if int(length.sum()) != len(tips):
+        raise InputError(f"{path}: the lengths of the clips do not add up to {len(tips)} frames")
+    song, split = songs_and_splits(path, arrays, len(length))
+    ends = np.cumsum(length)
+    return [
+        _Clip(
+            tips[end - frames : end],
+            None if goal is None else goal[end - frames : end],
+            song[clip],
+            split[clip],
+        )
+        for clip, (end, frames) in enumerate(zip(ends, length, strict=True))
+    ]
+
+
+def _zarr(folder: Path) -> list[_Clip]:
+    """The high-level data set: state (N, 212) and action (N, 184), ends of clips inclusive."""
+    try:
+        zarr: Any = importlib.import_module("zarr")
+    except ImportError as error:
+        raise InputError(
+            f"{folder}: reading it needs the package zarr: pip install -e '.[video]'"
+        ) from error
+    wanted = f"{folder}: not PianoMime's high-level data set"
+    try:
+        root = zarr.open_group(str(folder), mode="r")
+        group, meta = (root.get(name, root) for name in ("data", "meta"))
+        widths = tuple(group[name].shape[1] for name in ("state", "action"))
+        if widths != _WIDTHS:
+            raise InputError(f"{wanted}: state and action have {widths} columns, not {_WIDTHS}")
+        # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers; what follows are
+        # those of the frames to come.
+        action = np.asarray(group["action"][:, : _TIPS + _FINGERS])
+        ends = np.asarray(meta["episode_ends"]).astype(np.int64)
+    except InputError:
+        raise
+    # A damaged store raises what its codecs and its metadata happen to raise.
+    except (LookupError, ValueError, OSError, TypeError, AttributeError, RuntimeError) as error:
+        raise InputError(f"{wanted} ({error})") from error
+    if not len(ends) or (np.diff(ends, prepend=-1) <= 0).any() or ends[-1] != len(action) - 1:
+        raise InputError(f"{wanted}: its clips do not end where its {len(action)} rows do")
+    clips: list[_Clip] = []
+    first = 0
+    for end in ends:
+        rows = action[first : end + 1]
+        first = int(end) + 1
+        tips = rows[:, :_TIPS].reshape(-1, 2, 6, 3).astype(np.float64)
+        keys = np.rint(rows[:, _TIPS:] * 89).astype(np.int64) - 1
+        goal = np.zeros((len(rows), KEYS), bool)
+        frame, _ = np.nonzero((keys >= 0) & (keys < KEYS))
+        goal[frame, keys[(keys >= 0) & (keys < KEYS)]] = True
+        clips.append(_Clip(tips, goal))
+    return clips

@@ -1,0 +1,1 @@
+"""Environments of one song, for Gymnasium and Stable-Baselines3."""

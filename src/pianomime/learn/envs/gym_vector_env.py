@@ -1,0 +1,86 @@
+"""Many environments at once for Gymnasium, `gymnasium.make_vec("pianomime/Song-v0", ...)`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from pianomime.learn.envs.gym_env import action_space, make_batch, observation_space
+from pianomime.learn.expert.config import EnvConfig
+from pianomime.plan.demonstration import Demonstration
+
+_Rows = NDArray[np.float32]
+
+
+class SongVectorEnv(VectorEnv[_Rows, _Rows, NDArray[Any]]):
+    """As `SongEnv`, for many; an episode that ends begins again in the same step.
+
+    Args:
+        demonstration, config: as for `SongEnv`.
+        num_envs: how many.
+        threads: how many step at the same time; 0 for one on each core.
+    """
+
+    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
+
+    def __init__(
+        self,
+        demonstration: Demonstration | str | Path,
+        config: EnvConfig | str = "paper",
+        num_envs: int = 1,
+        threads: int = 0,
+    ) -> None:
+        self.batch = make_batch(demonstration, config, num_envs, threads)
+        self.num_envs = num_envs
+        self.single_observation_space = observation_space(self.batch)
+        self.single_action_space = action_space(self.batch)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[_Rows, dict[str, Any]]:
+        """Begin an episode in every environment."""
+        if isinstance(seed, list):
+            # One generator draws for all of them.
+            given = [one for one in seed if one is not None]
+            seed = int(np.random.SeedSequence(given).generate_state(1)[0]) if given else None
+        super().reset(seed=seed)
+        self.batch.reset(self.np_random)
+        return self.batch.observations.copy(), {"frame": self.batch.frames.copy()}
+
+    def step(
+        self, actions: _Rows
+    ) -> tuple[_Rows, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
+        """Play one frame in every environment."""
+        step = self.batch.step(actions)
+        info: dict[str, Any] = {
+            "frame": self.batch.frames.copy(),
+            "f1": step.f1,
+            "blow_ups": step.blow_ups,
+        }
+        ended = step.terminated | step.truncated
+        if ended.any():
+            info["final_obs"] = np.full(self.num_envs, None, object)
+            for row in np.flatnonzero(ended):
+                info["final_obs"][row] = self.batch.observations[row].copy()
+            info["_final_obs"] = ended
+            info["final_info"] = {name: info[name].copy() for name in ("frame", "f1", "blow_ups")}
+            info["_final_info"] = ended
+            self.batch.reset(self.np_random, np.flatnonzero(ended))
+            # What is told now is of the episodes that begin.
+            info["frame"] = self.batch.frames.copy()
+            info["f1"] = np.where(ended, 0.0, step.f1)
+            info["blow_ups"] = np.where(ended, 0, step.blow_ups)
+        return (
+            self.batch.observations.copy(),
+            step.reward,
+            step.terminated,
+            step.truncated,
+            info,
+        )

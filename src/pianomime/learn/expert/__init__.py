@@ -1,0 +1,1 @@
+"""Experts of one song: residual PPO and trajectory search."""

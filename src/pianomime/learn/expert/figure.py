@@ -1,0 +1,32 @@
+"""Figure 8 of the paper: the F1 of all experts, sorted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from pianomime.files import atomic
+from pianomime.learn.expert.expert_worker import Row
+
+
+def draw_experts(rows: list[Row], path: Path) -> None:
+    """Draw a picture of the experts that did not fail.
+
+    Args:
+        rows: a row a song.
+        path: where to, a .png.
+    """
+    f1 = sorted((row["f1"] for row in rows if "error" not in row), reverse=True)
+    figure = Figure(figsize=(8, 3), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.bar(range(1, len(f1) + 1), f1, width=1.0, color="#4c72b0", edgecolor="white")
+    if f1:
+        mean = sum(f1) / len(f1)
+        axes.axhline(mean, color="#c44e52", linewidth=1, label=f"mean {mean:.3f}")
+        axes.legend(loc="lower left")
+    axes.set(xlabel="experts, best first", ylabel="F1", ylim=(0, 1), xlim=(0.5, len(f1) + 0.5))
+    with atomic(path) as temporary:
+        figure.savefig(temporary, dpi=120)

@@ -1,0 +1,191 @@
+"""Experts of many songs: a process a song on this machine, or a task a song on a Ray cluster."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import threading
+from collections.abc import Callable, Generator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from pianomime.errors import InputError
+from pianomime.files import atomic
+from pianomime.learn.expert.config import ExpertConfig
+from pianomime.learn.expert.expert_worker import ExpertProcess, Request, Row
+from pianomime.learn.expert.figure import draw_experts
+from pianomime.learn.runs.run import is_run
+from pianomime.learn.runs.validation import check_config
+
+Progress = Callable[[int, int, float], None]
+"""Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
+
+_SUFFIXES = (".npz", ".mid", ".midi")
+
+
+def train_experts(
+    folder: Path,
+    out: Path,
+    config: ExpertConfig,
+    start: float = 0.0,
+    seconds: float = 30.0,
+    jobs: int | None = None,
+    ray: str | None = None,
+    progress: Progress | None = None,
+) -> list[Row]:
+    """Train an expert of every demonstration and MIDI file in a folder.
+
+    Each song's run is a folder in `out`; one that was interrupted goes on where it was, and one
+    that is finished is not trained again. A song that fails is a row with an `error`.
+
+    Args:
+        folder: of songs, also further down.
+        out: for the runs, and for `experts.json`, `experts.md` and `experts.png`.
+        config: how.
+        start: where the excerpt of each begins [s].
+        seconds: its length at most [s].
+        jobs: songs at the same time on this machine; one a core if None.
+        ray: address of a Ray cluster whose nodes all see both folders; "local" starts one here.
+        progress: told how far it is.
+
+    Returns:
+        A row for each song, in the order of their names.
+
+    Raises:
+        InputError: settings do not fit, there are no songs, `out` is their folder, or there is no
+            such cluster.
+        OSError: `out` cannot be written.
+    """
+    check_config(config)
+    songs = find_experts_songs(folder, out)
+    if jobs is not None and jobs < 1:
+        raise InputError(f"jobs must be 1 or more, not {jobs}")
+    if out.is_file():
+        raise InputError(f"{out}: is a file; a folder is needed")
+    out.mkdir(parents=True, exist_ok=True)
+    requests = {
+        name: Request(str(song.resolve()), str(out.resolve() / name), config, start, seconds)
+        for name, song in songs.items()
+    }
+    rows: dict[str, Row] = {}
+
+    def tell() -> None:
+        if progress is not None:
+            f1 = [row["f1"] for row in rows.values() if "error" not in row]
+            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else math.nan)
+
+    tell()
+    if ray is None:
+        trained = _in_processes(requests, jobs or _cores())
+    else:
+        from pianomime.learn.expert.ray_cluster import on_cluster
+
+        trained = on_cluster(requests, ray)
+    with closing(trained):
+        for name, row in trained:
+            rows[name] = {**row, "song": name}
+            tell()
+    ordered = [rows[name] for name in songs]
+    _write(out / "experts.json", json.dumps(ordered, indent=1) + "\n")
+    _write(out / "experts.md", experts_table(ordered))
+    draw_experts(ordered, out / "experts.png")
+    return ordered
+
+
+def find_experts_songs(folder: Path, out: Path | None = None) -> dict[str, Path]:
+    """Demonstrations and MIDI files of a folder by the names of their runs, in order.
+
+    Args:
+        folder: of songs; what runs in it keep for themselves is left out.
+        out: where results are, which are left out too.
+
+    Raises:
+        InputError: there is no such folder, nothing in it, or it is `out`.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder")
+    if out is not None and out.resolve() == folder.resolve():
+        raise InputError(f"{out}: holds the songs; name another folder for the results")
+    results = None if out is None else out.resolve()
+    if results is not None and not results.is_relative_to(folder.resolve()):
+        results = None  # Also where the songs are a folder among the results.
+    files = sorted(
+        file
+        for file in folder.rglob("*")
+        if file.suffix.lower() in _SUFFIXES
+        and not is_run(file.parent)
+        and not (results is not None and file.resolve().is_relative_to(results))
+    )
+    if not files:
+        raise InputError(f"{folder}: no demonstrations or MIDI files in this folder")
+    names = ["-".join(file.relative_to(folder).with_suffix("").parts) for file in files]
+    doubled = {name for name in names if names.count(name) > 1}
+    return {
+        f"{name}{file.suffix}" if name in doubled else name: file
+        for name, file in zip(names, files, strict=True)
+    }
+
+
+def experts_table(rows: list[Row]) -> str:
+    """The rows as Markdown, and their mean."""
+    lines = ["| song | F1 | precision | recall | steps |", "| --- | ---: | ---: | ---: | ---: |"]
+    for row in rows:
+        song = str(row["song"]).replace("|", "\\|")
+        if "error" in row:
+            error = str(row["error"]).replace("|", "\\|")
+            lines.append(f"| {song} | failed: {error} | | | |")
+        else:
+            cells = " | ".join(f"{row[name]:.3f}" for name in ("f1", "precision", "recall"))
+            lines.append(f"| {song} | {cells} | {row['steps']} |")
+    good = [row for row in rows if "error" not in row]
+    if good:
+        means = (sum(row[n] for row in good) / len(good) for n in ("f1", "precision", "recall"))
+        lines.append(f"| **mean of {len(good)}** | {' | '.join(f'{m:.3f}' for m in means)} | |")
+    return "\n".join(lines) + "\n"
+
+
+def _in_processes(
+    requests: dict[str, Request], jobs: int
+) -> Generator[tuple[str, Row], None, None]:
+    """Rows in the order in which they are done."""
+    running: set[ExpertProcess] = set()
+    lock = threading.Lock()
+    stopped = False
+
+    def train(name: str) -> tuple[str, Row]:
+        with lock:
+            if stopped:
+                return name, {"error": "stopped"}
+            process = ExpertProcess(requests[name])
+            running.add(process)
+        row = process.row()
+        with lock:
+            running.discard(process)
+        return name, row
+
+    # The threads only wait for the processes.
+    threads = ThreadPoolExecutor(min(jobs, len(requests)))
+    try:
+        for future in as_completed([threads.submit(train, name) for name in requests]):
+            yield future.result()
+    finally:
+        with lock:
+            stopped = True
+            left: list[Any] = list(running)
+        threads.shutdown(wait=False, cancel_futures=True)
+        for process in left:
+            process.close()
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _write(path: Path, text: str) -> None:
+    with atomic(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -1,0 +1,201 @@
+"""Reading videos: frames at a steady rate whatever the file's own, in flat memory."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.video.film.read_ahead import ahead
+
+_WIDEST = 1280
+"""Larger pictures are shrunk to this size [pixels]: hands and keys are plain enough in them."""
+
+_STRIDE = 15
+"""Frames."""
+
+_SHRINKING = av.video.reformatter.Interpolation.AREA
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture.
+
+    Attributes:
+        seconds: when it is shown, counted from the first frame of the video [s].
+        picture: (height, width, 3) uint8, at the film's working size.
+    """
+
+    seconds: float
+    picture: NDArray[np.uint8]
+
+
+class Film:
+    """A video file; every pass over its frames opens it anew, so passes do not disturb each other.
+
+    Attributes:
+        path: the file.
+        width, height: of the pictures as they are shown (a turned phone's are turned) [pixels].
+        zoom: that size divided by the working size, in which pictures are given.
+        seconds: length of the video, as its header says; 0 where it does not [s].
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Look at the file.
+
+        Raises:
+            InputError: no such file, not a video, no picture in it.
+        """
+        self.path = Path(path)
+        if self.path.is_dir():
+            raise InputError(f"{self.path}: is a folder, not a video")
+        with self._open() as (container, stream):
+            first = next(self._decode(container, stream), None)
+            if first is None:
+                raise InputError(f"{self.path}: no picture in it can be read")
+            self._turns = round(getattr(first, "rotation", 0) / 90) % 4
+            self._start = first.time or 0.0
+            self._timed = first.time is not None
+            size = (first.width, first.height)
+            self.width, self.height = size if self._turns % 2 == 0 else size[::-1]
+            self.zoom = max(1.0, max(size) / _WIDEST)
+            self._working = tuple(max(2, round(side / self.zoom)) for side in size)
+            self.seconds = _length(container, stream)
+            self._interval = 1 / float(stream.average_rate or stream.guessed_rate or 30)
+
+    def frames(self, rate: float, first: int = 0) -> Iterator[Frame]:
+        """The frame nearest to first, first + 1, ... / rate seconds, to the end of the video.
+
+        Where the video has no frame near a moment (variable frame rates, dropped frames), the one
+        that is shown then is given again. A damaged end is left out, with a warning. A few frames
+        are read ahead in a thread of their own.
+
+        Args:
+            rate: frames a second.
+            first: the frame to begin with; what lies before it is skipped, not read.
+        """
+        return ahead(self._frames(rate, first))
+
+    def _frames(self, rate: float, due: int) -> Iterator[Frame]:
+        before: tuple[float, Any] | None = None
+        last: Frame | None = None
+        with self._open() as (container, stream):
+            stream.thread_type = "AUTO"
+            # Without times in the file only counting from its beginning tells which frame it is.
+            if due and self._timed:
+                goal = self._start + due / rate - self._interval
+                with suppress(av.error.FFmpegError):
+                    container.seek(int(goal / stream.time_base), stream=stream)
+            for count, frame in enumerate(self._decode(container, stream)):
+                at = count * self._interval if frame.time is None else frame.time - self._start
+                while before is not None and due / rate < at:
+                    nearest = before if due / rate - before[0] <= at - due / rate else (at, frame)
+                    last = self._picture(*nearest, last)
+                    yield last
+                    due += 1
+                before = at, frame
+            if before is not None:
+                # The last frame is shown for as long as any.
+                while due / rate < before[0] + min(self._interval, 0.1):
+                    last = self._picture(*before, last)
+                    yield last
+                    due += 1
+
+    def sample(self, count: int) -> list[NDArray[np.uint8]]:
+        """Pictures from all over the video.
+
+        Not all of it is decoded, unless it does not say how long it is, or nothing in it can be
+        jumped to: then half as many pictures may be given.
+        """
+        return (self._jump(count) if self.seconds else []) or self._pass(count)
+
+    def _pass(self, count: int) -> list[NDArray[np.uint8]]:
+        """Every n-th picture, n doubled whenever there are too many."""
+        pictures: list[NDArray[np.uint8]] = []
+        step = 1
+        with self._open() as (container, stream):
+            stream.thread_type = "AUTO"
+            for number, frame in enumerate(self._decode(container, stream)):
+                if number % step:
+                    continue
+                if len(pictures) == count:
+                    pictures = pictures[::2]
+                    step *= 2
+                    if number % step:
+                        continue
+                pictures.append(self._picture(0.0, frame, None).picture)
+        return pictures
+
+    def _jump(self, count: int) -> list[NDArray[np.uint8]]:
+        pictures = []
+        visits: dict[float, int] = {}
+        with self._open() as (container, stream):
+            stream.thread_type = "AUTO"
+            for number in range(count):
+                goal = self._start + self.seconds * (number + 0.5) / count
+                try:
+                    container.seek(int(goal / stream.time_base), stream=stream)
+                except av.error.FFmpegError:
+                    continue
+                # Only key frames can be reached at once; where several goals lead to the same
+                # one, go on a little farther each time.
+                skip = -1
+                latest = None
+                for latest in self._decode(container, stream):
+                    if skip < 0:
+                        key = latest.time or 0.0
+                        visits[key] = visits.get(key, -1) + 1
+                        skip = _STRIDE * visits[key]
+                    if skip == 0 or (latest.time or 0.0) >= goal:
+                        break
+                    skip -= 1
+                if latest is not None:
+                    pictures.append(self._picture(0.0, latest, None).picture)
+        return pictures
+
+    def _picture(self, seconds: float, frame: Any, last: Frame | None) -> Frame:
+        if last is not None and last.seconds == seconds:
+            return last
+        picture = frame.reformat(*self._working, "rgb24", interpolation=_SHRINKING).to_ndarray()
+        return Frame(seconds, np.ascontiguousarray(np.rot90(picture, self._turns)))
+
+    @contextmanager
+    def _open(self) -> Iterator[tuple[Any, Any]]:
+        """The file, and the stream in it that is the video."""
+        try:
+            container = av.open(str(self.path))
+        except FileNotFoundError:
+            raise InputError(f"{self.path}: does not exist") from None
+        except (av.error.FFmpegError, OSError) as error:
+            raise InputError(f"{self.path}: not a video") from error
+        with container:
+            pictures = [
+                stream
+                for stream in container.streams.video
+                # The cover of a recording is a stream of one picture.
+                if not (getattr(stream, "disposition", 0) & av.stream.Disposition.attached_pic)
+            ]
+            if not pictures:
+                raise InputError(f"{self.path}: has no pictures; a video of a keyboard is needed")
+            yield container, pictures[0]
+
+    def _decode(self, container: Any, stream: Any) -> Iterator[Any]:
+        try:
+            yield from container.decode(stream)
+        except av.error.FFmpegError as error:
+            warnings.warn(f"{self.path}: cannot be read to its end ({error})", stacklevel=3)
+
+
+def _length(container: Any, stream: Any) -> float:
+    if stream.duration is not None:
+        return float(stream.duration * stream.time_base)
+    return 0.0 if container.duration is None else container.duration / 1e6

@@ -1,0 +1,105 @@
+"""The light of all keys over a whole video, in a file: hours of it would fill the memory."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.keyboard import KEYS
+
+_BLOCK = 2000
+"""Frames that lie together in the file, key after key: one read gives what a key did in them."""
+
+
+class LightRecord:
+    """What `KeyLight` reads, frame by frame, for `Glow` to read key by key.
+
+    It lies in an unnamed file, of which nothing is left when it is closed, by `with` or `close`.
+
+    Raises:
+        OSError: the disk of temporary files is full.
+    """
+
+    def __init__(self, zones: int) -> None:
+        """Begin an empty record of so many patches a key."""
+        self._file = tempfile.TemporaryFile(prefix="pianomime-")  # noqa: SIM115 - close() is ours
+        self._block = np.empty((zones, KEYS, _BLOCK, 3), np.uint8)
+        self._frames = 0
+
+    @classmethod
+    def of(cls, light: Iterable[NDArray[np.uint8]]) -> Self:
+        """Record frames (zones, 88, 3), at least one."""
+        frames = iter(light)
+        first = next(frames)
+        record = cls(len(first))
+        record.append(first)
+        for frame in frames:
+            record.append(frame)
+        return record
+
+    def append(self, light: NDArray[np.uint8]) -> None:
+        """Add a frame (zones, 88, 3)."""
+        self._block[:, :, self._frames % _BLOCK] = light
+        self._frames += 1
+        if self._frames % _BLOCK == 0:
+            self._file.seek(0, 2)
+            self._file.write(self._block.data)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return self._frames
+
+    def key(self, zone: int, key: int) -> NDArray[np.uint8]:
+        """(T, 3) colour of one patch of a key."""
+        light = np.empty((self._frames, 3), np.uint8)
+        for first in range(0, self._frames, _BLOCK):
+            light[first : first + _BLOCK] = self._read(first, zone, key, 1)[0]
+        return light
+
+    def blocks(self, zone: int) -> Iterator[NDArray[np.uint8]]:
+        """One patch of all keys: (n, 88, 3) of some thousands of frames at a time."""
+        for first in range(0, self._frames, _BLOCK):
+            yield self._read(first, zone, 0, KEYS).swapaxes(0, 1)
+
+    def every(self, step: int, zone: int) -> NDArray[np.uint8]:
+        """(ceil(T / step), 88, 3) one patch of all keys, in every step-th frame."""
+        some = np.empty((-(-self._frames // step), KEYS, 3), np.uint8)
+        first = 0
+        for block in self.blocks(zone):
+            picked = block[-first % step :: step]
+            at = -(-first // step)
+            some[at : at + len(picked)] = picked
+            first += len(block)
+        return some
+
+    def close(self) -> None:
+        """Give the file back."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        """Itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close."""
+        self.close()
+
+    def _read(self, first: int, zone: int, key: int, keys: int) -> NDArray[np.uint8]:
+        """(keys, n, 3) of the block that begins with frame `first`."""
+        frames = min(_BLOCK, self._frames - first)
+        if frames < _BLOCK:  # the last block is not in the file yet
+            return self._block[zone, key : key + keys, :frames]
+        zones = len(self._block)
+        self._file.seek((first // _BLOCK * zones * KEYS + zone * KEYS + key) * _BLOCK * 3)
+        read = self._file.read(keys * _BLOCK * 3)
+        return np.frombuffer(read, np.uint8).reshape(keys, _BLOCK, 3)

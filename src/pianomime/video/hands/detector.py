@@ -1,0 +1,128 @@
+"""MediaPipe's hand landmarker, frame by frame."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.video.hands.sightings import Sighting
+
+_POINTS = [0, 4, 8, 12, 16, 20]
+"""MediaPipe's numbers of the wrist and the five fingertips, thumb first."""
+
+
+class HandDetector:
+    """Finds up to two hands in each frame of one video. Use it as a context manager."""
+
+    def __init__(self, model: Path) -> None:
+        """Load the model.
+
+        Raises:
+            InputError: MediaPipe is not installed or cannot be used here, or the file is no model.
+        """
+        mediapipe, vision = _mediapipe()
+        self._image, self._format = mediapipe.Image, mediapipe.ImageFormat.SRGB
+        options = vision.HandLandmarkerOptions(
+            base_options=mediapipe.tasks.BaseOptions(model_asset_buffer=model.read_bytes()),
+            running_mode=vision.RunningMode.VIDEO,
+            num_hands=2,
+        )
+        self._chatty = True
+        try:
+            with _quiet():
+                self._landmarker = vision.HandLandmarker.create_from_options(options)
+        except OSError as error:  # its library is loaded only now
+            raise InputError(_advice(error)) from error
+        except (RuntimeError, ValueError) as error:
+            raise InputError(f"{model}: MediaPipe cannot use this hand model") from error
+
+    def __enter__(self) -> HandDetector:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._landmarker.close()
+
+    def detect(self, picture: NDArray[np.uint8], milliseconds: int) -> list[Sighting]:
+        """The hands in a picture.
+
+        Args:
+            picture: (height, width, 3) red, green, blue.
+            milliseconds: when it is; later than the one before.
+        """
+        image = self._image(image_format=self._format, data=picture)
+        # It says what it has to say about itself at the first picture.
+        with _quiet() if self._chatty else nullcontext():
+            result = self._landmarker.detect_for_video(image, milliseconds)
+        self._chatty = False
+        sightings = []
+        for marks, sides in zip(result.hand_landmarks, result.handedness, strict=True):
+            points = np.array([[marks[point].x, marks[point].y] for point in _POINTS])
+            best = sides[0]
+            right = best.score if best.category_name == "Right" else 1 - best.score
+            sightings.append(Sighting(points, float(right)))
+        return sightings
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what a library writes past Python to stderr off the terminal."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+def _mediapipe() -> tuple[Any, Any]:
+    """The modules `mediapipe` and `mediapipe.tasks.python.vision`."""
+    # MediaPipe imports OpenCV for drawing, which we have no use for and which, in the build that
+    # it asks for, does not load on a machine without libGL.
+    stand_in = "cv2" not in sys.modules and not _loads("cv2")
+    if stand_in:
+        sys.modules["cv2"] = ModuleType("cv2")
+    try:
+        mediapipe = importlib.import_module("mediapipe")
+        return mediapipe, importlib.import_module("mediapipe.tasks.python.vision")
+    except ImportError as error:
+        raise InputError(
+            f"MediaPipe is needed to see hands: pip install -e '.[video]' ({error})"
+        ) from error
+    except OSError as error:
+        raise InputError(_advice(error)) from error
+    finally:
+        if stand_in:
+            sys.modules.pop("cv2", None)
+
+
+def _loads(name: str) -> bool:
+    try:
+        importlib.import_module(name)
+    except ImportError:
+        return False
+    return True
+
+
+def _advice(error: object) -> str:
+    return (
+        f"MediaPipe does not load here ({error}); on Debian or Ubuntu "
+        "`apt-get install libegl1 libgles2` helps, and MediaPipe 1.0.0 needs neither"
+    )

@@ -1,0 +1,133 @@
+"""Points of the keyboard that a person has named: a JSON file.
+
+It holds one object, `{"points": {NAME: [COLUMN, ROW], ...}}`, in pixels of the video. A name is a
+key and one of its corners: "A0 front left", "C4 back right"; a black key also has the middle of
+its front edge, "F#3 front". Front is the player's side, left the bass.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.keyboard import BLACK, KEYS, key_name
+from pianomime.video.keyboard.keyboard import FAR, FRONT, LEFT_EDGE, WHITE_WIDTH
+from pianomime.video.keyboard.plane import Plane, fit_plane_robustly
+from pianomime.world.parameters import key_centres, key_half_sizes
+
+# People type these names: a sharp is the sign that keyboards have.
+_KEY_OF_NAME = {key_name(key).replace("♯", "#"): key for key in range(KEYS)}
+_NAME = re.compile(r"([A-G]#?\d) (front|back)(?: (left|right))?")
+
+SUGGESTED = (
+    "A0 front left",
+    "C8 front right",
+    "A0 back left",
+    "C8 back right",
+    "C4 front left",
+    "C4 back left",
+    "F#2 front",
+    "F#6 front",
+)
+"""Eight points that are easy to see and far apart, as in the paper."""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedPoints:
+    """The plane that named points tell.
+
+    Attributes:
+        plane: from the video's pixels to the world.
+        names: of the points that agree with it.
+        left_out: of the others.
+        error_metres: median distance of the former from where the plane has them.
+    """
+
+    plane: Plane
+    names: list[str]
+    left_out: list[str]
+    error_metres: float
+
+    def describe(self) -> str:
+        """One line for a person."""
+        wrong = f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
+        return f"{len(self.names)} points, within {self.error_metres * 1000:.1f} mm{wrong}"
+
+
+def place_of(name: str) -> NDArray[np.float64]:
+    """World x, y [m] of a named point.
+
+    Raises:
+        InputError: there is no such point.
+    """
+    match = _NAME.fullmatch(name.strip())
+    key = None if match is None else _KEY_OF_NAME.get(match[1])
+    if match is None or key is None or (match[3] is None and not BLACK[key]):
+        raise InputError(
+            f"{name!r} is no point of a keyboard; points are called like {SUGGESTED[0]!r} or "
+            f"{SUGGESTED[-1]!r}"
+        )
+    centre, half = key_centres()[key], key_half_sizes()[key]
+    side = {"left": -1, None: 0, "right": 1}[match[3]]
+    if BLACK[key]:
+        x = centre[0] + half[0] if match[2] == "front" else FAR
+        return np.array([x, centre[1] + side * half[1]])
+    # The middle of the gap between keys, which is what one sees.
+    white = int((~BLACK[:key]).sum()) + (side + 1) / 2
+    return np.array([FRONT if match[2] == "front" else FAR, LEFT_EDGE + WHITE_WIDTH * white])
+
+
+def read_points(path: Path) -> NamedPoints:
+    """The plane of a file of named points; those that disagree with the others are left out.
+
+    Raises:
+        InputError: no such file, or one that does not hold four points or more, well apart.
+    """
+    try:
+        text = path.read_text("utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: does not exist") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read") from error
+    return parse_points(text, path)
+
+
+def parse_points(text: str, path: Path) -> NamedPoints:
+    """The same of the text of a file.
+
+    Args:
+        text: JSON.
+        path: of the file, for messages.
+
+    Raises:
+        InputError: it does not hold four points or more, well apart.
+    """
+    try:
+        content = json.loads(text)
+        given = content["points"]
+        names = list(given)
+        pixels = np.array([given[name] for name in names], np.float64).reshape(-1, 2)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f'{path}: must hold {{"points": {{NAME: [COLUMN, ROW], ...}}}}') from error
+    if len(names) < 4 or not np.isfinite(pixels).all():
+        raise InputError(f"{path}: 4 points at least are needed, of numbers")
+    world = np.array([place_of(name) for name in names])
+    try:
+        plane, good = fit_plane_robustly(pixels, world)
+    except (ValueError, np.linalg.LinAlgError) as error:
+        raise InputError(
+            f"{path}: the points do not tell where the keyboard is: {error}"
+        ) from error
+    off = np.linalg.norm(plane.to_world(pixels) - world, axis=1)
+    return NamedPoints(
+        plane,
+        [name for name, fits in zip(names, good, strict=True) if fits],
+        [name for name, fits in zip(names, good, strict=True) if not fits],
+        float(np.median(off[good])),
+    )

@@ -1,0 +1,1 @@
+"""Which notes are played in a video, and by which fingers."""

@@ -1,0 +1,129 @@
+"""When in the video a MIDI file begins: where fingers, and lit keys, are where the notes are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve
+
+from pianomime.keyboard import FRAME_RATE, KEYS
+from pianomime.music import Score
+from pianomime.video.film.light_record import LightRecord
+from pianomime.video.hands.tracks import HandTracks
+from pianomime.video.notes.key_light import LIT, Glow, unattended
+from pianomime.video.notes.touch import touching
+
+_MATCH = 0.7
+"""Share of notes with a finger on their key from which a MIDI file is taken to be the right one."""
+_INSIDE = 0.5
+"""Share of the music, or of the video if that is shorter, that must fall together."""
+
+
+@dataclass(frozen=True)
+class Offset:
+    """How a MIDI file lies on a video.
+
+    Attributes:
+        seconds: a note struck at t in the file is struck at t + seconds in the video.
+        touched: share of the notes within the video that have a finger on their key.
+        by_chance: the same for the middling offset: how it would be for any song.
+    """
+
+    seconds: float
+    touched: float
+    by_chance: float
+
+    @property
+    def matches(self) -> bool:
+        """Whether the file seems to be what is played."""
+        return self.touched >= _MATCH and self.touched >= self.by_chance + 0.15
+
+
+def estimate_offset(
+    score: Score, tracks: HandTracks, light: LightRecord, given: float | None = None
+) -> Offset:
+    """Find the offset at which the score fits the video best.
+
+    Args:
+        score: of the MIDI file.
+        tracks: the hands.
+        light: of each frame, see `KeyLight`.
+        given: the offset, if it is known: then only how well it fits is found out.
+    """
+    points, away = tracks.seen_points(), unattended(tracks)
+    onset = np.floor(score.onset * FRAME_RATE + 0.5).astype(np.int64)
+    lags = np.arange(-int(onset.max()), len(points))
+    # How many notes fall within the video, for every lag.
+    counts = np.rint(fftconvolve(np.ones(len(points)), np.bincount(onset)[::-1]))
+
+    def mean(
+        value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]],
+    ) -> NDArray[np.float64]:
+        """Of the value (T,) that each key has, at the onsets of all notes within the video."""
+        return np.asarray(_at_onsets(value, score.key, onset, len(lags)) / np.maximum(counts, 1))
+
+    touched = mean(lambda key: touching(points, key) > np.exp(-1.0))
+    evidence = mean(lambda key: touching(points, key))
+    best_light, best_peak = np.zeros(len(lags)), 0.0
+    for zone, colourful in product(LIT, (True, False)):
+        rise = partial(_rise, Glow(light, away, zone, colourful))
+        found = mean(rise)
+        peak = float(found.max() - np.median(found))
+        if peak > best_peak:
+            best_light, best_peak = found, peak
+    total = evidence + best_light
+    length = score.onset.max() * FRAME_RATE - score.onset.min() * FRAME_RATE
+    first = lags + score.onset.min() * FRAME_RATE
+    together = np.minimum(first + length, len(points)) - np.maximum(first, 0)
+    possible = (together >= _INSIDE * min(length, len(points))) & (counts > 0)
+    # Music repeats itself: that many notes fit says more than that a few fit very well.
+    sure = (total - np.median(total[possible])) * np.sqrt(counts)
+    at = int(np.argmax(np.where(possible, sure, -np.inf)))
+    if given is None:
+        seconds = (lags[at] + _vertex(total, at)) / FRAME_RATE
+    else:
+        seconds = given
+        at = int(np.clip(round(given * FRAME_RATE) - lags[0], 0, len(lags) - 1))
+    return Offset(float(seconds), float(touched[at]), float(np.median(touched[possible])))
+
+
+def _rise(glow: Glow, key: int) -> NDArray[np.float32]:
+    """(T,) how much of a key comes on in each frame that was not on just before."""
+    shine = np.clip(glow.standing_out(key), 0, 1)
+    return np.maximum(np.diff(shine, prepend=shine[:1]), 0)
+
+
+def _at_onsets(
+    value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]],
+    key: NDArray[np.int64],
+    onset: NDArray[np.int64],
+    lags: int,
+) -> NDArray[np.float64]:
+    """(L,) sum of a value at the onsets of all notes, for every lag.
+
+    Args:
+        value: gives (T,) of a key.
+        key: (N,) of the notes.
+        onset: (N,) [frames].
+        lags: L.
+    """
+    total = np.zeros(lags)
+    for each in range(KEYS):
+        struck = onset[key == each]
+        if len(struck):
+            train = np.bincount(struck, minlength=onset.max() + 1).astype(np.float64)
+            total += fftconvolve(value(each).astype(np.float64), train[::-1])
+    return total
+
+
+def _vertex(value: NDArray[np.float64], at: int) -> float:
+    if not 0 < at < len(value) - 1:
+        return 0.0
+    before, here, after = value[at - 1 : at + 2]
+    curve = before - 2 * here + after
+    return float(0.5 * (before - after) / curve) if curve < 0 else 0.0

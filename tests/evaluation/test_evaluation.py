@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from pianomime import evaluate, songs
+from pianomime.errors import InputError
+from pianomime.evaluation.evaluation import markdown
+from pianomime.evaluation.song_worker import SongWorker
+from pianomime.policies.methods import WEIGHTS
+from pianomime.songs.find import find_songs
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Five songs that differ, and one file that is none."""
+    folder = tmp_path / "songs"
+    folder.mkdir()
+    for name in songs.names()[:5]:
+        (folder / f"{name}.mid").write_bytes(songs.path(name).read_bytes())
+    (folder / "broken|one.mid").write_text("this is no music")
+    return folder
+
+
+def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Path) -> None:
+    told: list[tuple[int, int, float]] = []
+    out = tmp_path / "out"
+    results = evaluate(
+        [folder], seconds=1.0, jobs=2, out=out, progress=lambda *step: told.append(step)
+    )
+
+    assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
+    assert set(results) == {"player", "effort", "seed", "seconds", "songs", "mean", "causes"}
+    assert results["seconds"] == 1.0
+    rows = {row["song"]: row for row in results["songs"]}
+    assert list(rows) == sorted(path.stem for path in folder.iterdir())
+    broken = rows.pop("broken|one")
+    assert set(broken) == {"song", "error"}
+    assert len(rows) == 5
+    mean = sum(row["f1"] for row in rows.values()) / 5
+    assert results["mean"]["f1"] == pytest.approx(mean, abs=1e-6)
+    assert {row["effort"] for row in rows.values()} == {results["effort"]}
+    assert "effort" not in results["mean"]
+    assert [step[:2] for step in told] == [(n, 6) for n in range(7)]
+    assert told[-1][2] == pytest.approx(mean)
+
+    for kind in ("missed", "wrong"):
+        lost = sum(sum(row["causes"][kind].values()) for row in rows.values())
+        wanted = sum(row["causes"]["wanted"] for row in rows.values())
+        assert sum(results["causes"][kind].values()) == pytest.approx(lost / wanted, abs=1e-4)
+    assert "causes" not in results["mean"]
+
+    tables = (out / "results.md").read_text(encoding="utf-8").split("\n\n")
+    table, causes = (text.splitlines() for text in tables)
+    assert len(table) == 2 + 6 + 1
+    assert len(causes) == 2 + sum(len(shares) for shares in results["causes"].values())
+    # Every line has as many cells as the first, the bar in the broken one's name escaped.
+    assert len({line.replace("\\|", "").count("|") for line in table}) == 1
+
+
+def test_weights_that_cannot_be_read_are_told_once(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "fingers.onnx").write_bytes(b"no network")
+    monkeypatch.setenv(WEIGHTS, str(tmp_path))
+    with pytest.raises(InputError, match=r"damaged|onnxruntime"):
+        evaluate([folder], "fingers", out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match="seed"):
+        evaluate([folder], seed=-1)
+
+
+def test_finished_songs_are_not_played_again(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (folder / "broken|one.mid").unlink()
+    first = evaluate(folder, seconds=1.0, jobs=2, out=out)
+    assert all("f1" in row for row in first["songs"]), first["songs"]
+    done = {file: file.stat().st_mtime_ns for file in (out / "songs").iterdir()}
+    assert len(done) == 5
+
+    assert evaluate(folder, seconds=1.0, out=out) == first
+    assert {file: file.stat().st_mtime_ns for file in (out / "songs").iterdir()} == done
+
+    # Another length, another player or another song under the same name is another result.
+    one = folder / f"{songs.names()[0]}.mid"
+    evaluate(one, seconds=1.5, jobs=1, out=out)
+    evaluate(one, player="zero-shot-ik", seconds=1.0, jobs=1, out=out)
+    one.write_bytes(songs.path(songs.names()[1]).read_bytes())
+    evaluate(one, seconds=1.0, jobs=1, out=out)
+    assert len(list((out / "songs").iterdir())) == 5 + 3
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there is no kill -9 on Windows")
+def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arguments = ["evaluate", str(folder), "-o", str(out), "--seconds", "1", "--jobs", "1"]
+    process = subprocess.Popen([sys.executable, "-m", "pianomime", *arguments])
+    began = time.monotonic()
+    while len(list(out.glob("songs/*.json"))) < 2:
+        assert process.poll() is None
+        assert time.monotonic() < began + 60
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not (out / "results.json").exists()
+    done = {file: file.stat().st_mtime_ns for file in out.glob("songs/*.json")}
+    assert 2 <= len(done) < 5
+    for file in done:
+        json.loads(file.read_text(encoding="utf-8"))
+
+    results = evaluate(folder, seconds=1.0, jobs=2, out=out)
+    assert sum("f1" in row for row in results["songs"]) == 5
+    assert {file: file.stat().st_mtime_ns for file in done} == done
+
+
+def test_a_crash_costs_one_song(folder: Path) -> None:
+    song = folder / f"{songs.names()[0]}.mid"
+    with SongWorker("zero-shot", 0, 1.0) as worker:
+        assert "f1" in worker.play(song)
+        os.kill(worker.pid, signal.SIGKILL)
+        crashed = worker.play(song)
+        assert crashed == {"song": song.stem, "error": "its process died (exit code -9)"}
+        assert "f1" in worker.play(song)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
+def test_no_process_outlives_a_run_that_stops(
+    error: type[BaseException], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[subprocess.Popen[str]] = []
+    start = SongWorker._start
+
+    def note(worker: SongWorker) -> subprocess.Popen[str]:
+        started.append(start(worker))
+        return started[-1]
+
+    def stop(done: int, total: int, f1: float) -> None:
+        if done:
+            raise error
+
+    monkeypatch.setattr(SongWorker, "_start", note)
+    before = set(threading.enumerate())
+    with pytest.raises(error):
+        evaluate(folder, seconds=1.0, jobs=2, effort=0, progress=stop)
+    for thread in set(threading.enumerate()) - before:
+        thread.join(timeout=10)
+    assert len(started) == 2
+    assert all(process.poll() is not None for process in started)
+
+
+def test_a_worker_does_not_wait_for_what_only_reports_need() -> None:
+    script = (
+        "import sys, pianomime.evaluation.song_worker\n"
+        "print([name for name in ('matplotlib', 'av', 'rich') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "[]\n"
+
+
+def test_when_all_fail_there_is_no_mean(tmp_path: Path) -> None:
+    (tmp_path / "broken.mid").write_text("this is no music")
+    results = evaluate(tmp_path, jobs=1)
+    assert results["mean"] == {}
+    assert results["causes"] == {"missed": {}, "wrong": {}}
+    assert "failed" in markdown(results)
+    assert list(tmp_path.iterdir()) == [tmp_path / "broken.mid"]
+
+
+def test_folders_are_searched_and_nothing_is_found_twice(folder: Path) -> None:
+    deep = folder / "a" / "b"
+    deep.mkdir(parents=True)
+    (deep / "UPPER.MIDI").write_bytes(b"")
+    (deep / "notes.txt").write_bytes(b"")
+    found = find_songs([folder, deep / "UPPER.MIDI", "ode-to-joy"])
+    assert len(found) == 6 + 1 + 1
+    assert deep / "UPPER.MIDI" in found
+
+
+def test_progress_is_told_before_any_process_works_and_has_no_mean_before_the_first_song(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "1.mid").write_text("this is no music")
+    (tmp_path / "2.mid").write_bytes(songs.path(songs.names()[0]).read_bytes())
+    told: list[tuple[int, int, float]] = []
+    start = SongWorker._start
+
+    def note(worker: SongWorker) -> subprocess.Popen[str]:
+        assert told == [(0, 2, pytest.approx(math.nan, nan_ok=True))]
+        return start(worker)
+
+    monkeypatch.setattr(SongWorker, "_start", note)
+    results = evaluate(
+        tmp_path, seconds=1.0, jobs=1, effort=0, progress=lambda *step: told.append(step)
+    )
+    assert [step[:2] for step in told] == [(0, 2), (1, 2), (2, 2)]
+    assert math.isnan(told[1][2])
+    assert told[2][2] == pytest.approx(results["mean"]["f1"], abs=1e-6)

@@ -1,0 +1,214 @@
+"""The expert data set: what is written is what was played."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+from pianomime.commands.collect import Collect
+from pianomime.errors import InputError
+from pianomime.learn.data.episode import COLUMNS, Episode, published_episodes, world_order
+from pianomime.learn.data.trajectories import ExpertData, write_expert_data
+from pianomime.learn.expert.config import ExpertConfig
+from pianomime.learn.expert.expert import load_expert, train_expert
+from pianomime.learn.runs.run import find_runs
+from pianomime.plan.demonstration import Demonstration
+from pianomime.world import World
+from pianomime.world.parameters import key_travel
+
+
+@pytest.fixture
+def runs(
+    two_notes: Demonstration, tmp_path: Path, small_ppo: ExpertConfig, small_search: ExpertConfig
+) -> Path:
+    """A run of each method in one folder, and one that was not begun."""
+    dataclasses.replace(two_notes, song=42, split="test").save(tmp_path / "demo.npz")
+    for name, config in (("a", small_ppo), ("b", small_search)):
+        short = dataclasses.replace(config, steps=128)
+        train_expert(tmp_path / "demo.npz", tmp_path / "runs" / name, short, threads=1)
+    return tmp_path / "runs"
+
+
+def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "experts.zarr"
+    Collect((runs,), out).run()
+    data = ExpertData.open(out)
+    assert len(data) == 2
+    for number, folder in enumerate(find_runs(runs)):
+        player, run = load_expert(folder)
+        performance = player.play(run.song.score)
+        episode = data.episode(number)
+        columns = episode.columns
+        assert episode.f1 == pytest.approx(performance.metrics()["f1"])
+        np.testing.assert_array_equal(columns["pressed"], performance.pressed)
+        np.testing.assert_allclose(columns["action"], performance.ctrl, atol=1e-6)
+        np.testing.assert_allclose(
+            columns["prior"] + columns["residual"], columns["action"], atol=1e-6
+        )
+        np.testing.assert_allclose(columns["joints"][1:], performance.qpos[:-1, 88:], atol=1e-6)
+        np.testing.assert_allclose(columns["keys"][1:], performance.key_state[:-1], atol=1e-6)
+        np.testing.assert_array_equal(columns["goal"], run.song.score.roll())
+        assert (episode.song, episode.split) == (42, "test")
+
+
+def test_it_reads_in_a_few_lines(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "experts.zarr"
+    Collect((runs / "a", runs / "b"), out).run()
+    data = zarr.open_group(str(out), mode="r")
+    assert data.metadata.zarr_format == 3
+    ends = data["episode_end"][:]
+    lengths = [len(data["joints"][first:end]) for first, end in zip([0, *ends], ends, strict=False)]
+    assert lengths == np.diff(ends, prepend=0).tolist()
+    for name, column in COLUMNS.items():
+        assert data[name].shape == (ends[-1], *column.shape)
+        assert data[name].attrs["about"] == column.about
+    # A data set is replaced; anything else is not.
+    Collect((runs / "a",), out).run()
+    assert len(ExpertData.open(out)) == 1
+    with pytest.raises(InputError, match="not an expert data set"):
+        Collect((runs,), runs).run()
+
+
+def test_what_fails_leaves_the_older_data(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "experts.zarr"
+    Collect((runs,), out).run()
+    (runs / "b" / "expert.safetensors").write_bytes(b"cut")
+    with pytest.raises(InputError, match="damaged"):
+        Collect((runs,), out).run()
+    assert len(ExpertData.open(out)) == 2
+    with pytest.raises(InputError, match="no episodes"):
+        write_expert_data(out, iter(()))
+    replace = os.replace
+
+    def fails(source: str | Path, target: str | Path) -> None:
+        # The fresh data set has its name already; the older one was moved aside.
+        if Path(target) == out and Path(source).name == out.name:
+            raise OSError("cannot be moved")
+        replace(source, target)
+
+    episode = ExpertData.open(out).episode(0)
+    with monkeypatch.context() as patch:
+        patch.setattr("pianomime.learn.data.trajectories.os.replace", fails)
+        with pytest.raises(OSError, match="cannot be moved"):
+            write_expert_data(out, iter([episode]))
+    assert len(ExpertData.open(out)) == 2
+
+
+@pytest.mark.parametrize(
+    ("runs", "message"),
+    [((), "no runs"), ((Path("nowhere"),), "no run"), ((Path("x.npz"),), "--demonstrations")],
+)
+def test_bad_input(runs: tuple[Path, ...], message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        Collect(runs, tmp_path / "experts.zarr").run()
+
+
+def published(folder: Path, joints: np.ndarray, ctrl: np.ndarray, keys: np.ndarray) -> None:
+    """Files of the published shape, of one clip among others."""
+    frames = len(joints)
+    np.savez(
+        folder / "experts.npz",
+        clip_id=[7],
+        length=[frames],
+        qpos_1e4=np.rint(joints * 1e4).astype(np.int16),
+        qvel_500=np.zeros((frames, 54), np.int16),
+        key_state_255=np.rint(keys * 255).astype(np.uint8),
+        ctrl_1e4=np.rint(ctrl * 1e4).astype(np.int16),
+    )
+    goal = np.zeros((frames + 5, 88), bool)
+    goal[5:, 40] = True
+    np.savez(
+        folder / "demonstrations.npz",
+        clip_id=[3, 7],
+        length=[5, frames],
+        fingertips=np.arange((frames + 5) * 36.0).reshape(-1, 2, 6, 3).astype(np.float32) / 1e4,
+        finger_key=np.full((frames + 5, 2, 5), -1, np.int8),
+        goal_packed=np.packbits(goal, axis=1),
+    )
+
+
+def test_published_experts_come_into_the_same_form(tmp_path: Path) -> None:
+    draw = np.random.default_rng(0)
+    joints, ctrl = draw.uniform(0, 0.1, (6, 54)), draw.uniform(-1, 1, (6, 46))
+    keys = np.zeros((6, 88))
+    keys[3:5, 40] = 1.0
+    published(tmp_path, joints, ctrl, keys)
+    out = tmp_path / "experts.zarr"
+    Collect((tmp_path / "experts.npz",), out, tmp_path / "demonstrations.npz").run()
+    episode = ExpertData.open(out).episode(0)
+    assert (episode.name, episode.song, episode.split) == ("clip007", -1, "train")
+    with np.load(tmp_path / "demonstrations.npz") as file:
+        marks = {"song_group": [4, 9], "split": ["train", "train"], "odd": [False, True]}
+        np.savez(tmp_path / "marked.npz", **file, **marks)
+    marked, _ = next(published_episodes(tmp_path / "experts.npz", tmp_path / "marked.npz"))
+    assert (marked.song, marked.split) == (9, "odd")
+    columns = episode.columns
+    # A row's keys are answered by the next row's; goal and tips are those of its own clip.
+    np.testing.assert_array_equal(columns["pressed"][:, 40], [0, 0, 1, 1, 0, 0])
+    assert columns["goal"][:, 40].all()
+    assert columns["fingertips"][0, 0, 0, 0] == pytest.approx(5 * 36 / 1e4)
+    # Left came first, with the forearm last.
+    model = World().model
+    assert columns["joints"][0, 0] == pytest.approx(joints[0, 27 + 24], abs=1e-4)
+    assert columns["joints"][0, 27 + 3] == pytest.approx(joints[0, 0], abs=1e-4)
+    assert model.joint(88).name == "rh_forearm_tx"
+    assert model.joint(88 + 27 + 3).name == "lh_WRJ2"
+
+
+def test_a_damaged_data_set_is_one_line(two_notes: Demonstration, tmp_path: Path) -> None:
+    columns = {name: np.ones((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    out = tmp_path / "experts.zarr"
+    write_expert_data(out, iter([Episode("one", 0.0, "ik", columns)]))
+    chunk = next(file for file in (out / "joints" / "c").rglob("*") if file.is_file())
+    chunk.write_bytes(chunk.read_bytes()[: chunk.stat().st_size // 2])
+    with pytest.raises(InputError, match="damaged"):
+        ExpertData.open(out).episode(0)
+    zarr.open_group(str(out)).attrs["episodes"] = [{"name": "one"}]
+    with pytest.raises(InputError, match="damaged"):
+        ExpertData.open(out)
+    for ends in (np.zeros(0, int), np.array([[4]]), np.array([np.nan]), np.array([4, 4])):
+        zarr.open_group(str(out)).create_array("episode_end", data=ends, overwrite=True)
+        with pytest.raises(InputError, match="damaged"):
+            ExpertData.open(out)
+    for file, text in (("goal/zarr.json", '{"zarr'), ("zarr.json", "[]")):
+        (out / file).write_text(text)
+        with pytest.raises(InputError, match=r"damaged|not an expert"):
+            ExpertData.open(out)
+
+
+def test_published_files_of_another_shape(tmp_path: Path) -> None:
+    published(tmp_path, np.zeros((6, 54)), np.zeros((6, 46)), np.zeros((6, 88)))
+    np.savez(tmp_path / "other.npz", length=[3])
+    with pytest.raises(InputError, match="clip_id"):
+        next(published_episodes(tmp_path / "experts.npz", tmp_path / "other.npz"))
+    with np.load(tmp_path / "demonstrations.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "longer.npz", **{**arrays, "length": [4, 7]})
+    with pytest.raises(InputError, match="clip 7 is not as long"):
+        next(published_episodes(tmp_path / "experts.npz", tmp_path / "longer.npz"))
+    np.savez(tmp_path / "odd.npz", **{**arrays, "length": [11]})
+    with pytest.raises(InputError, match="do not add up"):
+        next(published_episodes(tmp_path / "experts.npz", tmp_path / "odd.npz"))
+    with pytest.raises(InputError, match="does not exist"):
+        next(published_episodes(tmp_path / "none.npz", tmp_path / "other.npz"))
+
+
+def test_published_priors_are_near_the_recorded_actions(shared: Path) -> None:
+    folder = shared / "data" / "pianomime"
+    read = published_episodes(folder / "experts.npz", folder / "demonstrations.npz")
+    episode, total = next(read)
+    assert total == 211
+    low, high = World().model.actuator_ctrlrange.T
+    share = np.abs(episode.columns["residual"]) / (high - low)
+    assert (share < 1.05 * 0.03).all(axis=1).mean() > 0.97
+    assert 0.8 < episode.f1 <= 1.0
+    keys = episode.columns["keys"] * key_travel()
+    assert keys.shape[1] == 88
+    assert world_order(np.arange(54.0)[None])[0, :3].tolist() == [51.0, 52.0, 53.0]

@@ -1,0 +1,326 @@
+"""The environments: both libraries' checkers, what is seen, and that they are one and the same."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env as gymnasium_check
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+from numpy.typing import NDArray
+from stable_baselines3.common.env_checker import check_env as sb3_check
+from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
+
+import pianomime.learn
+from pianomime.learn.envs.batch import SongBatch
+from pianomime.learn.envs.observation import Observer, parts
+from pianomime.learn.envs.sb3_env import Sb3Env
+from pianomime.learn.expert.config import EnvConfig, EpisodeConfig, ObservationConfig, preset_config
+from pianomime.music import frame_metrics
+from pianomime.plan.demonstration import Demonstration
+from pianomime.track import DynamicTracker, IkTracker
+from pianomime.world import World
+
+assert pianomime.learn
+
+
+def actions(steps: int, envs: int, size: int = 46, seed: int = 0) -> NDArray[np.float32]:
+    draw = np.random.default_rng(seed)
+    return draw.uniform(-1, 1, (steps, envs, size)).astype(np.float32)
+
+
+@pytest.mark.parametrize("preset", ["paper", "best"])
+def test_both_checkers_pass(two_notes: Demonstration, preset: str) -> None:
+    env = gymnasium.make("pianomime/Song-v0", demonstration=two_notes, config=preset)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=".*Box observation space.*")
+        gymnasium_check(env.unwrapped)
+        sb3_check(env.unwrapped)
+
+
+def test_vector_forms_work_with_the_libraries_wrappers(two_notes: Demonstration) -> None:
+    envs = RecordEpisodeStatistics(
+        gymnasium.make_vec("pianomime/Song-v0", num_envs=3, demonstration=two_notes)
+    )
+    seen, _ = envs.reset(seed=1)
+    assert envs.observation_space.contains(seen)
+    frames = len(two_notes.plan)
+    for frame, action in enumerate(actions(frames, 3)):
+        seen, _, terminated, truncated, info = envs.step(action)
+        assert envs.observation_space.contains(seen)
+        assert terminated.all() == (frame == frames - 1)
+        assert not truncated.any()
+    assert (info["episode"]["l"] == frames).all()
+    assert info["final_obs"][0].shape == seen[0].shape
+    assert (info["frame"] == 0).all()
+
+    vec = VecMonitor(VecCheckNan(Sb3Env(SongBatch(two_notes, EnvConfig(), 2))))
+    assert vec.reset().shape == (2, 367)
+    for action in actions(frames, 2):
+        _, reward, done, infos = vec.step(action)
+    assert done.all()
+    assert reward.shape == (2,)
+    assert infos[0]["episode"]["l"] == frames
+    assert not infos[0]["TimeLimit.truncated"]
+
+
+def test_many_are_each_what_one_is_bit_for_bit(
+    two_notes: Demonstration, every_part: EnvConfig
+) -> None:
+    config = dataclasses.replace(every_part, episode=EpisodeConfig())
+    many = SongBatch(two_notes, config, 3)
+    many.reset(np.random.default_rng(0))
+    alone = [
+        gymnasium.make("pianomime/Song-v0", demonstration=two_notes, config=config)
+        for _ in range(3)
+    ]
+    for row, env in enumerate(alone):
+        seen, _ = env.reset(seed=0)
+        assert (seen == many.observations[row]).all()
+    for action in actions(len(two_notes.plan), 3):
+        step = many.step(action)
+        for row, env in enumerate(alone):
+            seen, reward, terminated, _, info = env.step(action[row])
+            assert (seen == many.observations[row]).all()
+            assert reward == step.reward[row]
+            assert terminated == step.terminated[row]
+            assert info["f1"] == step.f1[row]
+
+
+@pytest.mark.parametrize("prior", ["ik", "dynamic"])
+def test_no_residual_is_the_prior_alone(two_notes: Demonstration, prior: str) -> None:
+    batch = SongBatch(two_notes, EnvConfig(prior=prior), 1)  # type: ignore[arg-type]
+    batch.reset(np.random.default_rng(0))
+    tracker, world = {"ik": IkTracker, "dynamic": DynamicTracker}[prior](), World()
+    tracker.begin(two_notes.plan)
+    pressed = []
+    for frame in range(len(two_notes.plan)):
+        step = batch.step(np.zeros((1, 46)))
+        world.step(tracker.control(frame, world), False)
+        pressed.append(world.pressed)
+        assert (batch.state()["worlds"][0] == world.state()).all()
+    assert step.f1[0] == pytest.approx(frame_metrics(two_notes.score.roll(), pressed).f1)
+
+
+def test_residuals_are_a_share_of_the_ranges(two_notes: Demonstration) -> None:
+    seen = ObservationConfig(prior=True)
+    batch = SongBatch(two_notes, EnvConfig(observation=seen), 2)
+    batch.reset(np.random.default_rng(0))
+    prior = batch.observations[0, batch.observer.slices["prior"]].astype(float)
+    model = World().model
+    low, high = model.actuator_ctrlrange.T
+    action = np.vstack([np.ones(46), np.full(46, -7.0)])  # beyond -1 counts as -1
+    batch.step(action)
+    # MuJoCo's state ends with what was sent: it is asked of a World that is put there.
+    world = World()
+    sent = []
+    for state in batch.state()["worlds"]:
+        world.set_state(state)
+        sent.append(world.data.ctrl.copy())
+    proposed = (low + high) / 2 + prior * (high - low) / 2
+    np.testing.assert_allclose(sent[0], proposed + 0.03 * (high - low), atol=1e-6)
+    np.testing.assert_allclose(sent[1], proposed - 0.03 * (high - low), atol=1e-6)
+
+
+def test_observations_are_laid_out_as_told(two_notes: Demonstration) -> None:
+    config = ObservationConfig(goal=3, fingertips=2, errors=True, time=True)
+    sizes = {part.name: part.size for part in parts(config)}
+    assert sizes == {
+        "joints": 54,
+        "velocities": 54,
+        "keys": 88,
+        "goal": 264,
+        "fingertips": 72,
+        "prior": 46,
+        "pedal": 1,
+        "errors": 30,
+        "time": 1,
+    }
+    assert list(sizes) == [field.name for field in dataclasses.fields(config)]
+    batch = SongBatch(two_notes, EnvConfig(observation=config), 1)
+    assert batch.observer.size == sum(sizes.values())
+    batch.reset(np.random.default_rng(0))
+    goal, pedal = two_notes.score.roll(), two_notes.score.pedal_roll()
+    frames = len(goal)
+    padded = np.vstack([goal, np.zeros((3, 88), bool)])
+    for frame in range(frames + 1):
+        seen = {name: batch.observations[0, where] for name, where in batch.observer.slices.items()}
+        np.testing.assert_array_equal(seen["goal"].reshape(3, 88), padded[frame : frame + 3])
+        assert seen["time"] == pytest.approx(frame / frames)
+        if frame:
+            assert seen["pedal"] == pedal[frame - 1]
+        ahead = two_notes.plan.fingertips[np.minimum([frame, frame + 1], frames - 1)]
+        told = seen["fingertips"].reshape(2, 2, 6, 3) * [0.15, 0.6, 0.06] + [0.03, 0.0, 0.03]
+        np.testing.assert_allclose(told, ahead, atol=1e-6)
+        if frame < frames:
+            batch.step(np.zeros((1, 46)))
+
+
+@pytest.mark.parametrize("part", [field.name for field in dataclasses.fields(ObservationConfig)])
+def test_every_part_can_be_switched_off(two_notes: Demonstration, part: str) -> None:
+    everything = ObservationConfig(errors=True, time=True)
+    off: bool | int = 0 if part in ("goal", "fingertips") else False
+    less = dataclasses.replace(everything, **{part: off})  # type: ignore[arg-type]
+    goal, plan = two_notes.score.roll(), two_notes.plan
+    whole, rest = Observer(everything, goal, plan), Observer(less, goal, plan)
+    assert part not in [one.name for one in rest.parts if one.size]
+    size = whole.slices[part].stop - whole.slices[part].start
+    assert rest.size == whole.size - size
+
+
+def test_cut_short_is_not_over(two_notes: Demonstration) -> None:
+    frames = len(two_notes.plan)
+    config = EnvConfig(episode=EpisodeConfig(frames=10))
+    vec = Sb3Env(SongBatch(two_notes, config, 1))
+    vec.reset()
+    ends = []
+    for number, action in enumerate(actions(frames, 1)):
+        _, _, done, infos = vec.step(action)
+        if done[0]:
+            ends.append((number + 1, infos[0]["TimeLimit.truncated"]))
+    assert ends == [(10, True), (20, True)]
+
+    exact = SongBatch(two_notes, EnvConfig(episode=EpisodeConfig(frames=frames)), 1)
+    exact.reset(np.random.default_rng(0))
+    for action in actions(frames, 1):
+        step = exact.step(action)
+    assert step.terminated[0]
+    assert not step.truncated[0]
+
+
+def test_episodes_begin_anywhere_in_the_state_of_the_prior(two_notes: Demonstration) -> None:
+    config = EnvConfig(episode=EpisodeConfig(start="anywhere"))
+    batch = SongBatch(two_notes, config, 8)
+    batch.reset(np.random.default_rng(3))
+    began = batch.frames.copy()
+    assert len(set(began.tolist())) > 3
+    world, tracker = World(), IkTracker()
+    tracker.begin(two_notes.plan)
+    for frame in range(len(two_notes.plan)):
+        for row in np.flatnonzero(began == frame):
+            assert (batch.state()["worlds"][row] == world.state()).all()
+        world.step(tracker.control(frame, world))
+    again = SongBatch(two_notes, config, 8)
+    again.reset(np.random.default_rng(3))
+    assert (again.observations == batch.observations).all()
+    again.reset(np.random.default_rng(4))
+    assert (again.frames != began).any()
+
+
+def test_a_batch_goes_on_from_its_state_bit_for_bit(
+    two_notes: Demonstration, every_part: EnvConfig
+) -> None:
+    one, other = SongBatch(two_notes, every_part, 2), SongBatch(two_notes, every_part, 2)
+    one.reset(np.random.default_rng(0))
+    one.frames[:] = 0
+    one.step(actions(1, 2)[0])
+    one.set_state(one.state())
+    other.set_state(one.state())
+    for action in actions(5, 2, seed=1):
+        first, second = one.step(action), other.step(action)
+        assert (one.observations == other.observations).all()
+        assert (first.reward == second.reward).all()
+        assert (first.truncated == second.truncated).all()
+
+
+def test_the_policy_can_work_the_pedal(two_notes: Demonstration) -> None:
+    config = dataclasses.replace(
+        EnvConfig(),
+        action=dataclasses.replace(EnvConfig().action, pedal=True),
+        reward=dataclasses.replace(EnvConfig().reward, pedal=1.0),
+    )
+    batch = SongBatch(two_notes, config, 2)
+    assert batch.actions == 47
+    batch.reset(np.random.default_rng(0))
+    action = np.zeros((2, 47))
+    action[:, 46] = 1.0, -1.0
+    step = batch.step(action)
+    assert not two_notes.score.pedal_roll()[0]
+    assert step.reward[1] - step.reward[0] == pytest.approx(1.0)
+
+
+def test_what_ends_is_told_apart_from_what_begins(two_notes: Demonstration) -> None:
+    """The last observation of an episode is told aside, and that of the next in its place."""
+    frames = len(two_notes.plan)
+    config = EnvConfig(
+        observation=ObservationConfig(time=True), episode=EpisodeConfig(frames=frames - 5)
+    )
+    alone = SongBatch(two_notes, config, 1)
+    vec = Sb3Env(SongBatch(two_notes, config, 2))
+    envs = gymnasium.make_vec(
+        "pianomime/Song-v0", num_envs=2, demonstration=two_notes, config=config
+    )
+    alone.reset(np.random.default_rng(0))
+    first = alone.observations[0].copy()
+    vec.reset()
+    envs.reset(seed=0)
+    for action in actions(frames - 5, 1):
+        step = alone.step(action)
+        both = np.repeat(action, 2, axis=0)
+        seen, _, done, infos = vec.step(both)
+        shown, _, _, truncated, info = envs.step(both)
+    last = alone.observations[0]
+    assert last[-1] == pytest.approx((frames - 5) / frames)
+    assert step.truncated[0]
+    assert done.all()
+    assert truncated.all()
+    for row in range(2):
+        np.testing.assert_array_equal(infos[row]["terminal_observation"], last)
+        np.testing.assert_array_equal(info["final_obs"][row], last)
+        np.testing.assert_array_equal(seen[row], first)
+        np.testing.assert_array_equal(shown[row], first)
+        assert infos[row]["f1"] == info["final_info"]["f1"][row] == step.f1[0]
+    assert info["final_info"]["frame"].tolist() == [frames - 5] * 2
+    assert info["frame"].tolist() == [0, 0]
+    assert info["f1"].tolist() == [0.0, 0.0]
+
+
+def test_stepping_past_the_end_is_refused(two_notes: Demonstration) -> None:
+    batch = SongBatch(two_notes, EnvConfig(), 1)
+    batch.reset(np.random.default_rng(0))
+    for action in actions(len(two_notes.plan), 1):
+        batch.step(action)
+    with pytest.raises(ValueError, match="reset it first"):
+        batch.step(np.zeros((1, 46)))
+
+
+def test_poses_are_told_in_a_common_size(two_notes: Demonstration) -> None:
+    """Against what a World and MuJoCo's own figures say, joint by joint."""
+    config = ObservationConfig(errors=True)
+    batch = SongBatch(two_notes, EnvConfig(observation=config), 1)
+    batch.reset(np.random.default_rng(0))
+    world = World()
+    for action in actions(8, 1):
+        batch.step(action)
+    world.set_state(batch.state()["worlds"][0])
+    seen = {name: batch.observations[0, where] for name, where in batch.observer.slices.items()}
+    low, high = world.model.jnt_range[88:].T
+    # The right hand comes first, as in the model.
+    assert world.model.joint(88).name.startswith("rh_")
+    told = (low + high) / 2 + seen["joints"] * (high - low) / 2
+    np.testing.assert_allclose(told, world.data.qpos[88:], atol=1e-5)
+    assert np.abs(seen["joints"]).max() < 1.2
+    np.testing.assert_allclose(seen["velocities"] * 10.0, world.data.qvel[88:], atol=1e-5)
+    np.testing.assert_allclose(seen["keys"], world.key_state, atol=1e-6)
+    assert world.key_state.any() or not seen["keys"].any()
+    # Fingertips and their targets have the left hand first.
+    away = two_notes.plan.fingertips[8, :, 1:] - world.fingertips[:, 1:]
+    np.testing.assert_allclose(seen["errors"].reshape(2, 5, 3) * 0.05, away, atol=1e-6)
+
+
+def test_a_start_in_the_middle_has_the_pedal_as_it_is(two_notes: Demonstration) -> None:
+    config = EnvConfig(episode=EpisodeConfig(start="anywhere"))
+    batch = SongBatch(two_notes, config, 64)
+    batch.reset(np.random.default_rng(0))
+    pedal = np.r_[False, two_notes.score.pedal_roll()]
+    told = batch.observations[:, batch.observer.slices["pedal"]][:, 0]
+    np.testing.assert_array_equal(told, pedal[batch.frames])
+    assert 0 < told.sum() < len(told)
+
+
+def test_presets_are_named_in_mistakes() -> None:
+    with pytest.raises(ValueError, match="paper, best"):
+        preset_config("worst")

@@ -1,0 +1,215 @@
+"""Experts of many songs: rows whatever happens, and a Ray cluster that loses a node."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pianomime.errors import InputError
+from pianomime.learn.expert.config import ExpertConfig, to_json
+from pianomime.learn.expert.many import experts_table, find_experts_songs, train_experts
+from pianomime.learn.runs.run import RunFolder
+from pianomime.plan.demonstration import Demonstration
+
+
+@pytest.fixture
+def songs(two_notes: Demonstration, tmp_path: Path) -> Path:
+    """Three songs that can be played, and one file that cannot."""
+    folder = tmp_path / "songs"
+    (folder / "more").mkdir(parents=True)
+    for name in ("a.npz", "b.npz", "more/a.npz"):
+        two_notes.save(folder / name)
+    (folder / "broken.mid").write_bytes(b"no music")
+    return folder
+
+
+def test_failed_songs_are_rows_and_finished_ones_are_kept(
+    songs: Path, tmp_path: Path, small_search: ExpertConfig
+) -> None:
+    out = tmp_path / "out"
+    told: list[tuple[int, int]] = []
+    rows = train_experts(
+        songs, out, small_search, jobs=2, progress=lambda done, total, _: told.append((done, total))
+    )
+    assert [row["song"] for row in rows] == ["a", "b", "broken", "more-a"]
+    assert [bool(row.get("error")) for row in rows] == [False, False, True, False]
+    assert told[0] == (0, 4)
+    assert told[-1] == (4, 4)
+    assert json.loads((out / "experts.json").read_text()) == rows
+    assert (out / "experts.md").read_text() == experts_table(rows)
+    assert "failed" in experts_table(rows)
+    assert (out / "experts.png").read_bytes().startswith(b"\x89PNG")
+
+    before = {path: path.stat().st_mtime_ns for path in out.glob("*/state.safetensors")}
+    again = train_experts(songs, out, small_search, jobs=2)
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert [row.get("f1") for row in again] == [row.get("f1") for row in rows]
+
+
+def test_runs_are_no_songs(songs: Path, small_search: ExpertConfig) -> None:
+    """Runs keep their song, also those that were killed before they were runs."""
+    names = list(find_experts_songs(songs))
+    out = songs / "runs"
+    first = [row["song"] for row in train_experts(songs, out, small_search, jobs=2)]
+    assert first == names
+    (out / "half").mkdir()
+    (out / "half" / "song.npz").write_bytes((songs / "a.npz").read_bytes())
+    assert list(find_experts_songs(songs, out)) == names
+    # Results of another call.
+    (out / "half" / "song.npz").unlink()
+    assert list(find_experts_songs(songs, songs.parent)) == names
+    with pytest.raises(InputError, match="name another folder"):
+        train_experts(songs, songs, small_search)
+
+
+def test_bad_input(tmp_path: Path, small_search: ExpertConfig) -> None:
+    with pytest.raises(InputError, match="is not a folder"):
+        train_experts(tmp_path / "none", tmp_path / "out", small_search)
+    with pytest.raises(InputError, match="no demonstrations"):
+        train_experts(tmp_path, tmp_path / "out", small_search)
+
+
+def test_a_cluster_that_is_not_there(
+    songs: Path, tmp_path: Path, small_search: ExpertConfig
+) -> None:
+    pytest.importorskip("ray", reason="the extra scale is not installed")
+    with pytest.raises(InputError, match=r"no Ray cluster at '127\.0\.0\.1:1'"):
+        train_experts(songs, tmp_path / "out", small_search, ray="127.0.0.1:1")
+
+
+def test_a_cluster_that_loses_a_node_goes_on(
+    songs: Path, tmp_path: Path, small_search: ExpertConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ray = pytest.importorskip("ray", reason="the extra scale is not installed")
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setenv("RAY_ENABLE_UV_RUN_RUNTIME_ENV", "0")
+    long = dataclasses.replace(small_search, steps=4_000)
+    out = tmp_path / "out"
+    # The first node coordinates; all work is on two others.
+    quick = {"health_check_timeout_ms": 1000, "health_check_period_ms": 500}
+    head = {"num_cpus": 0, "_system_config": quick}
+    cluster = Cluster(initialize_head=True, head_node_args=head)
+    try:
+        nodes = [cluster.add_node(num_cpus=1) for _ in range(2)]
+        cluster.wait_for_nodes()
+        ray.init(address=cluster.address, log_to_driver=False)
+        busy: list[list[str]] = []
+        done = threading.Event()
+
+        def lose_one() -> None:
+            """Lose a node while it is in the middle of a song."""
+            runs: list[str] = []
+            while not any((out / run / "curve.json").exists() for run in runs):
+                if done.wait(0.05):
+                    return
+                runs = _runs_being_trained(_raylet(nodes[0]), out)
+            cluster.remove_node(nodes[0], allow_graceful=False)
+            busy.append(runs)
+
+        killer = threading.Thread(target=lose_one, daemon=True)
+        killer.start()
+        try:
+            rows = train_experts(songs, out, long, ray="auto")
+        finally:
+            done.set()
+        killer.join(60)
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+    assert [len(runs) for runs in busy] == [1]
+    assert [row["song"] for row in rows if "error" in row] == ["broken"]
+    curves = [RunFolder.load(out / row["song"]).curve() for row in rows if "error" not in row]
+    assert all(curve[-1].steps >= long.steps for curve in curves)
+    # The same song with the same seed: those that were interrupted have the same curve as the rest.
+    assert curves[0] == curves[1] == curves[2]
+
+
+def _raylet(node: Any) -> int:
+    """Number of the process that all others of a node come from."""
+    started: int = node.all_processes["raylet"][0].process.pid
+    return started
+
+
+def _runs_being_trained(raylet: int, out: Path) -> list[str]:
+    """Runs whose folder a process of a node holds open: the lock of the one that trains in it."""
+    held = []
+    for pid in _processes_below(raylet):
+        with contextlib.suppress(OSError):  # It may end while it is looked at.
+            links = [link.readlink() for link in Path("/proc", str(pid), "fd").iterdir()]
+            held += [target.name for target in links if target.parent == out]
+    return held
+
+
+def _processes_below(parent: int) -> list[int]:
+    found = []
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = status.read_text().rpartition(")")[2].split()
+            if int(fields[1]) == parent:
+                child = int(status.parent.name)
+                found += [child, *_processes_below(child)]
+    return found
+
+
+def test_a_kill_leaves_no_process(songs: Path, tmp_path: Path, small_search: ExpertConfig) -> None:
+    endless = dataclasses.replace(small_search, steps=10_000_000)
+    out = tmp_path / "out"
+    (songs / "broken.mid").unlink()
+    script = (
+        "import json, sys\n"
+        "from pathlib import Path\n"
+        "from pianomime.learn.expert.config import ExpertConfig, from_json\n"
+        "from pianomime.learn.expert.many import train_experts\n"
+        "config = from_json(ExpertConfig, json.loads(sys.argv[3]))\n"
+        "train_experts(Path(sys.argv[1]), Path(sys.argv[2]), config, jobs=2)\n"
+    )
+    told = json.dumps(to_json(endless))
+    asking = subprocess.Popen([sys.executable, "-c", script, str(songs), str(out), told])
+    deadline = time.monotonic() + 60
+    while len(list(out.glob("*/curve.json"))) < 2 and time.monotonic() < deadline:
+        assert asking.poll() is None
+        time.sleep(0.05)
+    assert len(_processes_about(out)) == 3
+    asking.kill()
+    asking.wait()
+    deadline = time.monotonic() + 30
+    while _processes_about(out) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert _processes_about(out) == []
+
+
+def test_stopping_leaves_no_process(
+    songs: Path, tmp_path: Path, small_search: ExpertConfig
+) -> None:
+    endless = dataclasses.replace(small_search, steps=10_000_000)
+
+    def stop(done: int, total: int, f1: float) -> None:
+        if done:  # the broken one
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_experts(songs, tmp_path / "out", endless, jobs=4, progress=stop)
+    assert _processes_about(tmp_path / "out") == []
+
+
+def _processes_about(out: Path) -> list[str]:
+    numbers = filter(str.isdigit, os.listdir("/proc"))
+    return [pid for pid in numbers if str(out).encode() in _command(pid)]
+
+
+def _command(pid: str) -> bytes:
+    try:
+        return Path("/proc", pid, "cmdline").read_bytes()
+    except OSError:
+        return b""

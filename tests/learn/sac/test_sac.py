@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from stable_baselines3 import SAC
+
+from pianomime import Player
+from pianomime.errors import InputError
+from pianomime.learn.runs.fit_folder import FitFolder
+from pianomime.learn.sac import training
+from pianomime.learn.sac.config import SacConfig
+from pianomime.learn.sac.training import STEPS, AskedSong, SacVecEnv, train_sac
+from pianomime.policies.methods import WEIGHTS
+from pianomime.policies.policy import load_network
+
+SMALL = SacConfig(frames=200, worlds=2, updates=1, batch=8, buffer=400, hidden=(16,), seconds=2.0)
+
+
+def test_who_does_nothing_stays_where_it_is(two_notes):
+    env = SacVecEnv([AskedSong.of(two_notes.score)], SMALL, 1)
+    env.reset()
+    for _ in range(5):
+        env.step(np.zeros((2, 46), np.float32))
+    # But for what hangs down and springs back.
+    assert np.abs(env.worlds.qpos_hands).max() < 0.1
+
+
+def test_an_action_moves_an_actuator_by_its_step(two_notes):
+    env = SacVecEnv([AskedSong.of(two_notes.score)], SMALL, 1)
+    env.reset()
+    said = np.zeros((2, 1, 46))
+    held = env.controls(said)
+    said[:, 0, 7] = 1.0
+    moved = env.controls(said) - held
+    np.testing.assert_allclose(moved[:, 7], STEPS[7])
+    np.testing.assert_allclose(np.delete(moved, 7, axis=1), 0.0)
+
+
+def test_what_was_trained_plays(two_notes, tmp_path, monkeypatch):
+    songs = tmp_path / "songs"
+    songs.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+    made = train_sac([songs], tmp_path / "out", SMALL, 1)
+    monkeypatch.setenv(WEIGHTS, str(tmp_path / "out"))
+    played = Player.from_name("multi-task-sac", 0).play(two_notes.score)
+    assert np.isfinite(played.ctrl).all()
+    written = made.stat().st_mtime_ns
+    train_sac([songs], tmp_path / "out", SMALL, 1)
+    assert made.stat().st_mtime_ns == written
+
+
+def test_a_file_of_another_training_is_not_taken_for_the_result(two_notes, tmp_path, monkeypatch):
+    songs, out = tmp_path / "songs", tmp_path / "out"
+    songs.mkdir()
+    out.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+    (out / "multi-task-sac.onnx").write_bytes(b"of another training")
+
+    def full(*_):
+        raise OSError("the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(training, "export_network", full)
+        with pytest.raises(OSError, match="full"):
+            train_sac([songs], out, SMALL, 1)
+    load_network(train_sac([songs], out, SMALL, 1))
+
+
+@pytest.mark.parametrize("buffer", [400, 60])
+def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monkeypatch, buffer):
+    """Also when frames that were played first are forgotten again."""
+    songs, config = tmp_path / "songs", replace(SMALL, buffer=buffer)
+    songs.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+    monkeypatch.setattr(training, "_CHECKPOINT", 50)
+    train_sac([songs], tmp_path / "whole", config, 1)
+    kept = FitFolder.checkpoint
+
+    def stop(self, arrays, steps):
+        kept(self, arrays, steps)
+        if steps == 150:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(FitFolder, "checkpoint", stop)
+    with pytest.raises(KeyboardInterrupt):
+        train_sac([songs], tmp_path / "parts", config, 1)
+    monkeypatch.setattr(FitFolder, "checkpoint", kept)
+    train_sac([songs], tmp_path / "parts", config, 1)
+    one, other = (
+        FitFolder(tmp_path / name / "multi-task-sac").weights()[0] for name in ("whole", "parts")
+    )
+    for name, array in one.items():
+        np.testing.assert_array_equal(array, other[name])
+
+
+def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch):
+    """Of what the environment shows, the mean of its actions, in steps of the actuators."""
+    songs, kept = tmp_path / "songs", []
+    songs.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+
+    class Kept(SAC):
+        def __init__(self, policy, env, **settings):
+            super().__init__(policy, env, **settings)
+            kept.append((self, env))
+
+    monkeypatch.setattr(training, "SAC", Kept)
+    made = train_sac([songs], tmp_path / "out", SMALL, 1)
+    (model, env), (run, _) = kept[0], load_network(made)
+    scaled = env.see()[:, 0]
+    env.scale = None
+    plain = env.see()[:, 0]
+    wanted = STEPS * model.predict(scaled, deterministic=True)[0]
+    given = {"goal": plain[:, : 4 * 88].reshape(-1, 4, 88), "vector": plain[:, 4 * 88 :]}
+    np.testing.assert_allclose(run(given)[0][:, 0], wanted, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "change", [{"frames": 80}, {"buffer": 4}, {"discount": -0.1}, {"hidden": (16, 0)}]
+)
+def test_settings_out_of_range_are_refused(two_notes, tmp_path, change):
+    two_notes.score.to_midi(tmp_path / "one.mid")
+    with pytest.raises(InputError):
+        train_sac([tmp_path], tmp_path / "out", replace(SMALL, **change), 1)

@@ -1,0 +1,129 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pianomime import Player, excerpt, songs
+from pianomime.errors import InputError
+from pianomime.music import Score
+from pianomime.plan import FingertipPlan
+from pianomime.players.player import PLAYERS
+from pianomime.policies.methods import FINGERS, METHODS
+from pianomime.world import World
+
+
+def two_notes() -> Score:
+    return Score(
+        key=np.array([40, 44]),
+        onset=np.array([2.0, 6.0]),
+        offset=np.array([3.0, 7.0]),
+        velocity=np.array([80, 90]),
+        pedal=np.array([[1.0, 2.5]]),
+        title="two notes",
+    )
+
+
+def test_an_excerpt_begins_with_its_first_note() -> None:
+    whole = excerpt(two_notes())
+    np.testing.assert_allclose(whole.onset, [0.0, 4.0])
+    np.testing.assert_allclose(excerpt(two_notes(), start=3.5).onset, [0.0])
+    np.testing.assert_allclose(excerpt(two_notes(), seconds=4.5).offset, [1.0, 4.5])
+    assert len(excerpt(two_notes(), seconds=2.0)) == 1
+
+
+@pytest.mark.parametrize(
+    ("start", "seconds", "message"),
+    [
+        (0.0, 0.0, "seconds must be more than 0"),
+        (0.0, -3.0, "seconds must be more than 0"),
+        (0.0, float("nan"), "seconds must be more than 0"),
+        (-1.0, 30.0, "start must be 0 or more"),
+        (float("nan"), 30.0, "start must be 0 or more"),
+        (7.0, 30.0, "two notes lasts 7.0 s"),
+    ],
+)
+def test_excerpts_that_make_no_sense_are_refused(
+    start: float, seconds: float, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        excerpt(two_notes(), start, seconds)
+
+
+class OneFinger:
+    """Plans nothing; its tracker writes down when it is asked what, and waves."""
+
+    def __init__(self) -> None:
+        self.asked: list[int] = []
+
+    def plan(self, score: Score) -> FingertipPlan:
+        frames = len(score.roll())
+        return FingertipPlan(
+            np.zeros((frames, 2, 6, 3)),
+            np.full((frames, 2, 5), -1, np.int8),
+            np.full(len(score), -1, np.int8),
+            np.full(len(score), -1, np.int8),
+        )
+
+    def begin(self, plan: FingertipPlan) -> None:
+        self.asked = []
+
+    def control(self, frame: int, world: World) -> np.ndarray:
+        self.asked.append(frame)
+        return np.full(46, 0.01 * (frame % 5))
+
+
+def test_a_player_asks_for_every_frame_once_and_records_what_happened() -> None:
+    one = OneFinger()
+    score = excerpt(two_notes(), seconds=2.0)
+    told: list[tuple[str, int, int]] = []
+    performance = Player("one finger", one, one).play(score, lambda *step: told.append(step))
+
+    frames = len(score.roll())
+    assert one.asked == list(range(frames))
+    assert len(performance) == frames
+    assert performance.player == "one finger"
+    assert performance.effort == 0
+    assert performance.dropped_notes == len(score)
+    np.testing.assert_array_equal(performance.pedal, score.pedal_roll())
+    assert told[0] == ("planning", 0, 0)
+    assert told[-1] == ("playing", frames, frames)
+
+    # Replaying the recorded controls leads through the recorded states.
+    world = World()
+    for frame in range(frames):
+        world.step(performance.ctrl[frame], pedal=bool(performance.pedal[frame]))
+        np.testing.assert_array_equal(world.qpos, performance.qpos[frame])
+        np.testing.assert_array_equal(world.pressed, performance.pressed[frame])
+        np.testing.assert_array_equal(world.key_state, performance.key_state[frame])
+
+
+def test_frames_in_which_the_physics_broke_are_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Fragile(World):
+        steps = 0
+
+        def step(self, ctrl: np.ndarray, pedal: bool = False) -> None:
+            super().step(ctrl, pedal)
+            Fragile.steps += 1
+            if Fragile.steps in (3, 4, 8):
+                self.blow_ups += 1
+
+    monkeypatch.setattr("pianomime.players.player.World", Fragile)
+    one = OneFinger()
+    performance = Player("one finger", one, one).play(excerpt(two_notes(), seconds=2.0))
+    assert performance.blow_ups.tolist() == [2, 3, 7]
+
+
+def test_an_unknown_player_is_refused_with_a_list() -> None:
+    with pytest.raises(InputError, match=r"no player 'liszt'.*zero-shot"):
+        Player.from_name("liszt")
+
+
+# Those that learned have weights, and tests, of their own.
+@pytest.mark.parametrize("name", sorted({*PLAYERS} - {FINGERS, *METHODS}))
+def test_every_player_plays_and_does_so_again(name: str) -> None:
+    score = excerpt(Score.from_midi(songs.path("beethoven-ode-to-joy")), seconds=3.0)
+    first = Player.from_name(name).play(score)
+    assert first.player == name
+    assert first.metrics()["recall"] > 0.2
+    again = Player.from_name(name).play(score)
+    np.testing.assert_array_equal(first.qpos, again.qpos)

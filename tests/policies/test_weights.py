@@ -1,0 +1,55 @@
+"""The weights that come with the program."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pianomime import Player, Score, excerpt, songs
+from pianomime.policies.methods import WEIGHTS, weights_folder
+
+
+@pytest.fixture(autouse=True)
+def shipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No others."""
+    monkeypatch.delenv(WEIGHTS, raising=False)
+
+
+@pytest.fixture(scope="module")
+def score() -> Score:
+    """Five seconds that nobody learned from."""
+    return excerpt(Score.from_midi(songs.path("bach-prelude-c")), seconds=5)
+
+
+def test_they_are_small() -> None:
+    files = list(weights_folder().glob("*.onnx"))
+    assert files
+    assert sum(file.stat().st_size for file in files) < 20e6
+    assert (weights_folder() / "README.md").is_file()
+
+
+def test_fingers_add_something() -> None:
+    """To what the zero-shot player makes of songs that it did not learn from."""
+    some = [
+        excerpt(Score.from_midi(songs.path(name)), seconds=12)
+        for name in ("beethoven-ode-to-joy", "petzold-minuet-g", "satie-gymnopedie-1")
+    ]
+    with_it, without = (
+        np.mean([Player.from_name(name, 0).play(one).metrics()["f1"] for one in some])
+        for name in ("fingers", "zero-shot")
+    )
+    assert with_it > without
+
+
+@pytest.mark.parametrize(
+    ("name", "least"), [("fingers", 0.85), ("two-stage-diff", 0.3), ("two-stage-mse", 0.3)]
+)
+def test_they_play(score: Score, name: str, least: float) -> None:
+    first, again = (Player.from_name(name, 0).play(score) for _ in range(2))
+    assert first.metrics()["f1"] > least
+    np.testing.assert_array_equal(first.ctrl, again.ctrl)
+
+
+def test_another_seed_draws_otherwise(score: Score) -> None:
+    first, other = (Player.from_name("two-stage-diff", 0, seed).play(score) for seed in (0, 1))
+    assert not np.array_equal(first.ctrl, other.ctrl)

@@ -1,0 +1,100 @@
+import warnings
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.music import Score, frame_metrics
+from pianomime.plan import FingertipPlan, ZeroShotPlanner
+from pianomime.players.player import Player
+from pianomime.track import (
+    DynamicTracker,
+    PredictiveSamplingConfig,
+    PredictiveSamplingTracker,
+    Tracker,
+)
+from pianomime.world import World
+
+QUICK = PredictiveSamplingConfig(variations=12)
+
+
+@pytest.fixture(scope="module")
+def score() -> Score:
+    """Leaps in both hands, too quick for one pass to hit them all."""
+    key = np.array([20, 60, 39, 70, 25, 58, 40, 66, 22, 63, 37, 72])
+    onset = np.repeat(np.arange(6), 2) * 0.25
+    return Score(key, onset, onset + 0.2, np.full(12, 64))
+
+
+@pytest.fixture(scope="module")
+def plan(score: Score) -> FingertipPlan:
+    return ZeroShotPlanner().plan(score)
+
+
+def follow(tracker: Tracker, plan: FingertipPlan) -> tuple[NDArray[np.float64], float]:
+    world = World()
+    tracker.begin(plan)
+    ctrl, pressed = [], []
+    for frame in range(len(plan)):
+        ctrl.append(tracker.control(frame, world))
+        world.step(ctrl[-1])
+        pressed.append(world.pressed)
+    return np.array(ctrl), frame_metrics(plan.keys(), np.array(pressed)).f1
+
+
+def test_hits_more_keys_than_the_tracker_alone(plan: FingertipPlan) -> None:
+    _, alone = follow(DynamicTracker(), plan)
+    _, helped = follow(PredictiveSamplingTracker(DynamicTracker(), QUICK), plan)
+    assert alone < 0.99, "the passage has to be hard for the test to say anything"
+    assert helped > alone
+
+
+def test_same_plan_same_controls_also_the_second_time(plan: FingertipPlan) -> None:
+    tracker = PredictiveSamplingTracker(DynamicTracker(), QUICK)
+    first, _ = follow(tracker, plan)
+    again, _ = follow(tracker, plan)
+    np.testing.assert_array_equal(first, again)
+
+
+def test_leaves_alone_what_goes_well(plan: FingertipPlan) -> None:
+    silent = FingertipPlan(
+        plan.fingertips + [0.0, 0.0, 0.05],
+        np.full_like(plan.finger_key, -1),
+        plan.note_hand,
+        plan.note_finger,
+    )
+    plain, _ = follow(DynamicTracker(), silent)
+    helped, _ = follow(PredictiveSamplingTracker(DynamicTracker(), QUICK), silent)
+    np.testing.assert_array_equal(plain, helped)
+
+
+def test_the_world_is_left_as_it_was(plan: FingertipPlan) -> None:
+    tracker, world = PredictiveSamplingTracker(DynamicTracker(), QUICK), World()
+    tracker.begin(plan)
+    before = world.state()
+    tracker.control(0, world)
+    np.testing.assert_array_equal(world.state(), before)
+
+
+def test_more_effort_tries_more() -> None:
+    tried = [PredictiveSamplingConfig.of_effort(effort) for effort in (1, 2, 3)]
+    rollouts = [config.variations * config.rounds for config in tried]
+    assert rollouts == sorted(set(rollouts))
+
+
+@pytest.mark.parametrize("effort", [-1, 4])
+def test_no_such_effort(effort: int) -> None:
+    with pytest.raises(InputError, match="effort must be"):
+        Player.from_name("zero-shot", effort)
+
+
+def test_an_imagined_disaster_is_no_warning(plan: FingertipPlan) -> None:
+    wild = PredictiveSamplingConfig(variations=8, joint=50.0, wrist=50.0, slide=5.0)
+    tracker, world = PredictiveSamplingTracker(DynamicTracker(), wild), World()
+    tracker.begin(plan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for frame in range(12):
+            world.step(tracker.control(frame, world))
+    assert world.blow_ups == 0
