@@ -32,7 +32,7 @@ def test_length_and_dropped_notes() -> None:
         ("fingertips", np.full((4, 2, 6, 3), np.nan), "not finite"),
         ("finger_key", np.zeros((3, 2, 5), np.int8), "finger_key must be"),
         ("finger_key", np.zeros((4, 10), np.int8), "finger_key must be"),
-        ("note_hand", np.zeros(2, np.int8), "one entry a note"),
+        ("note_hand", np.zeros(2, np.int8), "one entry per note"),
     ],
 )
 def test_refuses_what_does_not_fit(name: str, value: NDArray[np.generic], message: str) -> None:

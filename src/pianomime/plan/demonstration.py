@@ -1,4 +1,4 @@
-"""Demonstration: a score with the fingertips of a human who played it."""
+"""Demonstration: a Score with a FingertipPlan that plays it, and where the plan came from."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from pianomime.archive import read_archive, write_arrays
 from pianomime.errors import InputError
 from pianomime.files import atomic
-from pianomime.keyboard import FRAME_RATE, NO_KEY
+from pianomime.keyboard import EXCERPT_SECONDS, FRAME_RATE, NO_KEY
 from pianomime.music import Score
-from pianomime.plan import FingertipPlan
+from pianomime.plan.fingertip_plan import FingertipPlan
 
 TRAIN = "train"
-"""The split of what is for training."""
+"""Name of the split that is used for training."""
 _VERSION = 1
 _SCORE = ("key", "onset", "offset", "velocity", "pedal")
 _PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
@@ -26,17 +26,23 @@ _PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """What a video, or a data set, tells of how a human played something.
+    """A score and one way to play it: that of a human in a video, or of a planner.
+
+    Experts are trained to follow it, and learned policies to imitate it.
 
     Attributes:
-        score: what was played; time 0 is the first frame of the plan.
-        plan: where the human's fingertips were, and what they pressed; a row for each frame of
+        score: the notes that are played; time 0 is the first frame of the plan.
+        plan: where the fingertips are and which keys they press, with a row for each frame of
             `score.roll()`.
-        source: name of the video or data set.
-        homography: (3, 3) from the video's pixels to world x, y [m]; all NaN if unknown.
-        quality: figures that tell how good the source was: names to numbers, texts or lists.
-        song: number that demonstrations of one song share; -1 where nobody knows.
-        split: part of its data set that it belongs to; only "train" is for training.
+        source: what the plan was made from: the name of a video, of a data set or of a planner.
+        homography: (3, 3) from pixels of the video to world x, y [m]; all NaN where unknown.
+        quality: how well the source could be read, by name: numbers, texts or lists.
+        song: id that all demonstrations of one song share, so that they can be kept on one side
+            of a train-validation split; -1 where unknown.
+        split: part of the data set that it belongs to; only "train" is used for training.
+
+    Raises:
+        ValueError: the plan has not one row per frame or not one entry per note of the score.
     """
 
     score: Score
@@ -49,16 +55,20 @@ class Demonstration:
 
     def __post_init__(self) -> None:
         if len(self.plan) != self.score.frames():
-            raise ValueError(f"{len(self.plan)} rows of a plan for {self.score.frames()} frames")
+            raise ValueError(
+                f"the plan has {len(self.plan)} rows, the score {self.score.frames()} frames"
+            )
         if len(self.plan.note_hand) != len(self.score):
-            raise ValueError("the plan is not one for the notes of the score")
+            raise ValueError(
+                f"the plan is for {len(self.plan.note_hand)} notes, the score has {len(self.score)}"
+            )
 
-    def excerpt(self, start: float = 0.0, seconds: float = 30.0) -> Demonstration:
-        """The part from the first sound at or after `start`, cut between frames.
+    def excerpt(self, start: float = 0.0, seconds: float = EXCERPT_SECONDS) -> Demonstration:
+        """Cut out a part, between frames, that begins with the first sound at or after `start`.
 
         Args:
-            start: where to begin looking for the first note [s].
-            seconds: length at most [s]; may be infinite.
+            start: where to look for the first sound [s].
+            seconds: greatest length [s]; may be infinite.
 
         Raises:
             InputError: a time is out of range, or nothing sounds after `start`.
@@ -82,7 +92,7 @@ class Demonstration:
         order = np.lexsort((score.key[inside], onset))
         rows = np.minimum(np.arange(first, first + part.frames()), len(self.plan) - 1)
         finger_key = self.plan.finger_key[rows]
-        # A piece that ends with a frame has one more, silent, row.
+        # The roll of a score that ends exactly on a frame has one more, silent row.
         finger_key[first + np.arange(len(rows)) >= end] = NO_KEY
         plan = FingertipPlan(
             self.plan.fingertips[rows],
@@ -93,10 +103,10 @@ class Demonstration:
         return replace(self, score=part, plan=plan)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write everything to one .npz file, whole or not at all.
+        """Write one .npz file, completely or not at all.
 
         Args:
-            path: where to; its folder must exist.
+            path: the file; its folder must exist.
         """
         arrays: dict[str, NDArray[np.generic]] = {
             "demonstration_version": np.array(_VERSION),
@@ -116,11 +126,14 @@ class Demonstration:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Demonstration:
-        """Read what `save` wrote.
+        """Read a file that `save` wrote.
+
+        Args:
+            path: the file.
 
         Raises:
-            OSError: there is no such file, or it cannot be read.
-            InputError: no demonstration, or one of a version that we do not know.
+            OSError: the file does not exist or cannot be read.
+            InputError: it is not a demonstration, or of an unknown version.
         """
         return read_archive(
             path, "a demonstration", ("demonstration_version", _VERSION), cls._from_arrays
@@ -137,7 +150,7 @@ class Demonstration:
             str(arrays["source"]),
             arrays["homography"],
             json.loads(str(arrays["quality"])),
-            # Not in files of older programs.
+            # Files of earlier versions lack these two.
             int(arrays.get("song", -1)),
             str(arrays.get("split", TRAIN)),
         )
@@ -145,36 +158,45 @@ class Demonstration:
 
 @dataclass(frozen=True)
 class DemonstrationPlanner:
-    """The planner that knows one score, and how a human played it.
+    """The planner of one score: it returns the plan of a demonstration.
 
     Attributes:
-        demonstration: what it knows.
+        demonstration: whose plan to return.
     """
 
     demonstration: Demonstration
 
     def plan(self, score: Score) -> FingertipPlan:
-        """The human's plan.
+        """Return the demonstration's plan.
+
+        Args:
+            score: must have the same roll as the demonstration's score.
 
         Raises:
-            InputError: the score is another one.
+            InputError: it is another score.
         """
         known = self.demonstration.score
         if score is not known and not np.array_equal(score.roll(), known.roll()):
-            raise InputError(f"{score.title}: not the score of the demonstration {known.title}")
+            raise InputError(f"{score.title}: is not the score of the demonstration {known.title}")
         return self.demonstration.plan
 
 
 def on_grid(score: Score) -> Score:
-    """The same score with times that are almost those of a frame put right on it.
+    """Move times that lie within rounding errors of a frame exactly onto the frame.
 
     Otherwise the rounding of a sum decides in which frame a note begins.
+
+    Args:
+        score: its onsets, offsets and pedal are moved by less than a microsecond.
     """
 
-    def snap(times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def round_to_frame(times: NDArray[np.float64]) -> NDArray[np.float64]:
         frame = np.rint(times * FRAME_RATE)
         return np.where(np.abs(times * FRAME_RATE - frame) < 1e-5, frame / FRAME_RATE, times)
 
     return replace(
-        score, onset=snap(score.onset), offset=snap(score.offset), pedal=snap(score.pedal)
+        score,
+        onset=round_to_frame(score.onset),
+        offset=round_to_frame(score.offset),
+        pedal=round_to_frame(score.pedal),
     )

@@ -1,4 +1,10 @@
-"""Which finger of which hand plays each note: a search over onsets for both hands at once."""
+"""Fingering: a beam search over onsets, for both hands at once.
+
+As in the models of Parncutt et al. (1997, "An ergonomic model of keyboard fingering for melodic
+fragments") and Al Kasimi et al. (2007, "A simple algorithm for automatic generation of polyphonic
+piano fingerings"), a cost of each chord and of each change from one to the next is minimised over
+the piece. The costs are our own, those of the robot's hands: see `fingering_cost`.
+"""
 
 from __future__ import annotations
 
@@ -23,22 +29,24 @@ from pianomime.plan.fingering_cost import (
 from pianomime.plan.fingertip_plan import LEFT, RIGHT
 from pianomime.world.layout import FINGER_COUNT
 
-# Notes of one onset that may be left out, by how many there are; or all of them but two or one,
-# or all. Of six or fewer, any.
 _MOST_DROPPED = {7: 4, 8: 4, 9: 3, 10: 3}
+"""How many of so many notes struck at once may be dropped, which bounds the number of options.
+
+It is also allowed to play only two of them, one or none. Of six or fewer, any may be dropped.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Fingering:
-    """Who plays the N notes of a score, and when.
+    """Hand, finger and frames of the N notes of a score.
 
     Attributes:
         hand: (N,) int8; 0 left, 1 right, -1 not played.
         finger: (N,) int8; 0 thumb .. 4 little, -1 not played.
-        start: (N,) first frame in which the finger presses; after the note's first where the
-            hand cannot be there in time.
-        stop: (N,) first frame in which the finger has let go; before the note's end where the
-            finger or the hand is needed elsewhere.
+        start: (N,) first frame in which the finger presses; later than the note's first frame
+            where the hand cannot arrive in time.
+        stop: (N,) first frame in which the finger no longer presses; earlier than the note's end
+            where the finger or the hand is needed elsewhere.
     """
 
     hand: NDArray[np.int8]
@@ -48,11 +56,16 @@ class Fingering:
 
 
 def find_fingering(score: Score, config: FingeringConfig | None = None) -> Fingering:
-    """Search the cheapest fingering, onset by onset, keeping the best partial ones.
+    """Find a cheap fingering by beam search, onset by onset.
 
-    A note is left out where no finger can reach it, or where playing it costs other notes more
-    than it is worth. Of more than ten notes struck at once the inner ones are left out; where
-    more than four of seven or eight, or three of nine or ten, are out of reach, all but two.
+    A note is dropped where no finger can reach it, or where playing it would cost other notes
+    more than its value. Of more than ten notes struck at once the inner ones are dropped; where
+    more than four of seven or eight, or more than three of nine or ten, are out of reach, all
+    but two.
+
+    Args:
+        score: the piece.
+        config: costs, and width of the beam.
     """
     config = config or FingeringConfig()
     frames = score.note_frames()
@@ -64,20 +77,20 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     )
     if not len(score):
         return fingering
-    worth = frame_worth(score)
+    value = frame_values(score)
     beam = _Beam.start()
     history = []
     onsets, event = np.unique(frames[:, 0], return_inverse=True)
     groups = np.split(np.argsort(event, kind="stable"), np.cumsum(np.bincount(event))[:-1])
     for onset, group in zip(onsets, groups, strict=True):
-        # Two voices may strike the same key at once: one finger plays both.
+        # Where two voices strike the same key at once, one finger plays both.
         keys, voice = np.unique(score.key[group], return_inverse=True)
-        # A note without a frame of its own is fingered as if it had one.
+        # A note that covers no frame is fingered as if it had one.
         ends = np.full(len(keys), onset + 1)
         np.maximum.at(ends, voice, frames[group, 1])
         outer = np.ones(len(keys), bool)
         outer[FINGER_COUNT : len(keys) - FINGER_COUNT] = False
-        struck = Struck(int(onset), keys[outer], ends[outer], worth)
+        struck = Struck(int(onset), keys[outer], ends[outer], value)
         beam, choice = beam.extend(struck, config)
         place = np.where(outer, np.cumsum(outer) - 1, -1)[voice]
         history.append((onset, group, place, choice))
@@ -102,34 +115,35 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     return fingering
 
 
-def frame_worth(score: Score) -> NDArray[np.float64]:
-    """(T + 6,) what one key is worth in all frames before each: one over the keys of each frame.
+def frame_values(score: Score) -> NDArray[np.float64]:
+    """(T + 1 + LATE,) Value of a key that is down in all frames before each.
 
-    The last five stand for frames after the end, into which a late note may seem to reach.
+    In one frame it is one over the number of keys that should be down. The last `LATE` entries
+    are for frames after the end, into which a note that begins late may reach.
     """
     keys = np.concatenate([score.roll().sum(axis=1), np.zeros(LATE)])
     return np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(keys, 1))])
 
 
 class _Choice(NamedTuple):
-    """How each of B rows of a beam came from the one before."""
+    """How each of the B rows of a beam came from a row of the beam before it."""
 
-    parent: NDArray[np.int32]  # (B,) the row it came from
-    let_go: NDArray[np.bool_]  # (B, 2, 5) fingers that have let go before the hand strikes
+    parent: NDArray[np.int32]  # (B,) row of the beam before
+    let_go: NDArray[np.bool_]  # (B, 2, 5) fingers that release their key before the hand strikes
     assignment: NDArray[np.int8]  # (B, M) 0..4 left thumb to little, 5..9 right, -1 not played
-    early: NDArray[np.int8]  # (B, 2) frames before the onset in which they have, at the latest
-    late: NDArray[np.int8]  # (B, 2) frames after the onset in which the hand strikes
+    early: NDArray[np.int8]  # (B, 2) frames before the onset by which they have released it
+    late: NDArray[np.int8]  # (B, 2) frames after the onset at which the hand strikes
 
 
 @dataclass(frozen=True, eq=False)
 class _Beam:
-    """B partial fingerings: what each of ten fingers last played, and where the hands are."""
+    """B partial fingerings: the last key of each of ten fingers, and where the hands are."""
 
-    cost: NDArray[np.float64]  # (B,)
-    key: NDArray[np.int64]  # (B, 2, 5) last key of each finger, -1 none yet
-    since: NDArray[np.int64]  # (B, 2, 5) frame in which it went down, -1 if none yet
+    cost: NDArray[np.float64]  # (B,) [key-frames]
+    key: NDArray[np.int64]  # (B, 2, 5) last key of each finger, -1 for none yet
+    since: NDArray[np.int64]  # (B, 2, 5) frame in which it went down, -1 for none yet
     until: NDArray[np.int64]  # (B, 2, 5) first frame in which the finger is free again
-    centre: NDArray[np.float64]  # (B, 2) [m] where the middle finger is at ease
+    centre: NDArray[np.float64]  # (B, 2) where the relaxed middle finger is [m]
 
     @staticmethod
     def start() -> _Beam:
@@ -143,7 +157,7 @@ class _Beam:
         )
 
     def extend(self, struck: Struck, config: FingeringConfig) -> tuple[_Beam, _Choice]:
-        """Every way to play the notes struck in one frame; the best few are kept."""
+        """Try every way to play the notes struck in one frame, and keep the cheapest."""
         options, pairs = _options_in_reach(struck.keys, config)
         hands = []
         for side in (LEFT, RIGHT):
@@ -167,7 +181,7 @@ class _Beam:
         parent, pair = np.unravel_index(chosen, total.shape)
 
         def both(name: str) -> NDArray[Any]:
-            """(keep, 2, ...) what was chosen, of each hand."""
+            """(keep, 2, ...) An attribute of the chosen continuations of both hands."""
             each = [
                 getattr(hand, name)[parent, pairs[pair, side]] for side, hand in enumerate(hands)
             ]
@@ -182,7 +196,7 @@ class _Beam:
         key[row, hand, finger] = struck.keys[note]
         since[row, hand, finger] = struck.onset + late[row, hand]
         until[row, hand, finger] = struck.ends[note]
-        # Every one is kept to the end: small, for hours of music.
+        # All choices are kept until the end of the piece: in hours of music, bytes count.
         small = (array.astype(np.int8) for array in (assignment, early, late))
         choice = _Choice(parent.astype(np.int32), let_go, *small)
         return _Beam(total[parent, pair], key, since, until, both("centre")), choice
@@ -191,7 +205,7 @@ class _Beam:
 def _options_in_reach(
     keys: NDArray[np.int64], config: FingeringConfig
 ) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
-    """The options (O, M) of each hand that it can reach, and the pairs (P, 2) of these."""
+    """The options (O, M) within reach of each hand, and which pairs (P, 2) go together."""
     options, pairs = _options(len(keys))
     strikes = _strikes(options, keys)
     for side in (LEFT, RIGHT):
@@ -204,7 +218,7 @@ def _options_in_reach(
 
 
 def _strikes(options: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(O, 5) the key that each finger is to strike in options (O, M) for M keys; `KEYS`: none."""
+    """(O, 5) Key that each finger strikes in options (O, M) for M keys, `KEYS` for none."""
     strikes = np.full((len(options), FINGER_COUNT), KEYS)
     option, note = np.nonzero(options >= 0)
     strikes[option, options[option, note]] = keys[note]
@@ -216,9 +230,9 @@ def _options(notes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Ways to play `notes` keys struck together, low to high.
 
     Returns:
-        options (O, notes): the finger 0..4 of one hand on each note, -1 for none; and
-        pairs (P, 2): which options of the left and the right hand go together. Fingers keep
-        their order along the keyboard.
+        options (O, notes), the finger 0..4 of one hand on each note, -1 for none; and
+        pairs (P, 2), which options of the left and the right hand go together. Fingers do not
+        cross, within a hand or between hands.
     """
     rows: dict[tuple[int, ...], int] = {}
     pairs = []

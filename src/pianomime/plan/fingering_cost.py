@@ -1,7 +1,8 @@
-"""What it costs one hand to strike some keys, given where its fingers are.
+"""Cost of striking some keys with one hand, given where its fingers are.
 
-Everything is weighed by what it is expected to cost in the end: key-frames, each worth one over
-the keys that should be down in its frame, for that is how much of the frame's score it is.
+To strike a key is to press it at the onset of a note. All costs are in key-frames, the expected
+number of wrong keys summed over frames. A key-frame has the *value* 1/n where n keys should be
+down in its frame, because that is its share of the frame's recall.
 """
 
 from __future__ import annotations
@@ -20,89 +21,118 @@ from pianomime.plan.reach import EASE, stretch
 from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.parameters import key_centres
 
-# [m] A finger that goes to another key, up and down again.
 _LIFT = 0.01
+"""[m] Way up and down that a finger makes in addition when it changes keys."""
 EARLY, LATE = 4, 5
-"""Choices of how many frames a hand leaves early (0 to 3), and arrives late (0 to 4)."""
+"""A hand leaves 0 to 3 frames before an onset and arrives 0 to 4 frames after it."""
 
 
 @dataclass(frozen=True)
 class FingeringConfig:
-    """Costs of the search for a fingering, in key-frames."""
+    """Costs of the fingering search, in key-frames."""
 
     beam: int = 80
-    """Partial fingerings kept at each onset."""
+    """Number of partial fingerings kept after each onset."""
     drop: float = 4.0
-    """For a note that no finger plays, beside its frames."""
+    """Cost of a note that no finger plays, in addition to its frames."""
     cut: float = 0.5
-    """For a held note that is let go early, beside the frames it loses."""
+    """Cost of releasing a held note early, in addition to the frames it loses."""
     late: float = 1.5
-    """For a note that begins late, beside the frames it loses."""
+    """Cost of a note that begins late, in addition to the frames it loses."""
     stretch: float = 4.0
-    """For two fingers at the limit of their reach; it grows with the fourth power."""
+    """Cost of two fingers at the limit of their reach; grows with the fourth power of the reach."""
     strain: float = 1.0
-    """The same, but it grows with the square."""
+    """Cost of two fingers at the limit of their reach; grows with the square of the reach."""
     travel_speed: float = 0.5
-    """[m/s] of a hand that costs 1 for each note it strikes (it grows with the square)."""
+    """Speed of a hand that costs 1 per note it strikes [m/s]; the cost grows with its square."""
     hop_speed: float = 0.3
-    """[m/s] of a finger from key to key, relative to its hand, that costs 1."""
+    """Speed of a finger between two keys, relative to its hand, that costs 1 [m/s]."""
     reuse: float = 4.0
-    """For a finger that goes straight from one key to another; less, the longer it was free."""
+    """Cost of a finger that changes keys within one frame; falls with the square of the frames."""
     thumb_on_black: float = 0.2
+    """Cost of the thumb on a black key."""
     weak_finger: float = 0.1
-    """For ring and little finger on any note."""
+    """Cost of the ring or the little finger on any key."""
     crossed: float = 0.5
-    """For hands nearer than `apart`."""
+    """Cost of hands that are closer than `apart`, or crossed."""
     apart: float = 0.10
-    """[m] between the middle fingers of the two hands."""
+    """Least distance from the left to the right middle finger along the keyboard [m]."""
 
 
 class Struck(NamedTuple):
-    """M keys that are struck in one frame."""
+    """M keys that are struck in one frame.
+
+    Attributes:
+        onset: the frame.
+        keys: (M,) the keys, low to high.
+        ends: (M,) frame after the last one in which each key should be down.
+        value: (T + 1 + LATE,) value of a key that is down in all frames before each.
+    """
 
     onset: int
-    keys: NDArray[np.int64]  # (M,) low to high
-    ends: NDArray[np.int64]  # (M,) one past the last frame of each
-    worth: NDArray[np.float64]  # (T + 1 + LATE,) of a key in all the frames before each
+    keys: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    value: NDArray[np.float64]
 
     @property
     def unit(self) -> float:
-        """Worth of a key-frame at the onset."""
-        return float(self.worth[self.onset + 1] - self.worth[self.onset])
+        """Value of a key-frame at the onset."""
+        return float(self.value[self.onset + 1] - self.value[self.onset])
 
     def lost(
         self, first: NDArray[np.int64] | int, end: NDArray[np.int64] | int
     ) -> NDArray[np.float64]:
-        """Worth of a key from frame `first` up to, and without, `end`; 0 if there are none."""
-        missed: NDArray[np.float64] = self.worth[np.maximum(end, first)] - self.worth[first]
+        """Value of a key that is missed from frame `first` up to, without, `end`; at least 0."""
+        missed: NDArray[np.float64] = self.value[np.maximum(end, first)] - self.value[first]
         return missed
 
 
 class Fingers(NamedTuple):
-    """The fingers of one hand, thumb first, in each of B partial fingerings."""
+    """The fingers of one hand, thumb first, in each of B partial fingerings.
 
-    key: NDArray[np.int64]  # (B, 5) last key of each finger, -1 none yet
-    since: NDArray[np.int64]  # (B, 5) frame in which it went down, -1 if none yet
-    until: NDArray[np.int64]  # (B, 5) first frame in which the finger is free again
-    centre: NDArray[np.float64]  # (B,) [m] where the middle finger is at ease
+    Attributes:
+        key: (B, 5) last key of each finger, -1 for none yet.
+        since: (B, 5) frame in which that key went down, -1 for none yet.
+        until: (B, 5) first frame in which the finger is free again.
+        centre: (B,) where the relaxed middle finger is along the keyboard [m].
+    """
+
+    key: NDArray[np.int64]
+    since: NDArray[np.int64]
+    until: NDArray[np.int64]
+    centre: NDArray[np.float64]
 
 
 class HandCost(NamedTuple):
-    """For each of B partial fingerings and O ways to go on."""
+    """Costs of O continuations of each of B partial fingerings, for one hand.
 
-    cost: NDArray[np.float64]  # (B, O)
-    centre: NDArray[np.float64]  # (B, O) [m] where the hand then is
-    let_go: NDArray[np.bool_]  # (B, O, 5) fingers that have let go before the hand strikes
-    early: NDArray[np.int64]  # (B, O) frames before the onset in which they have, at the latest
-    late: NDArray[np.int64]  # (B, O) frames after the onset in which the hand strikes
+    Attributes:
+        cost: (B, O) [key-frames].
+        centre: (B, O) where the relaxed middle finger then is along the keyboard [m].
+        let_go: (B, O, 5) fingers that release their key before the hand strikes.
+        early: (B, O) how many frames before the onset they have released it, at the latest.
+        late: (B, O) how many frames after the onset the hand strikes.
+    """
+
+    cost: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    let_go: NDArray[np.bool_]
+    early: NDArray[np.int64]
+    late: NDArray[np.int64]
 
 
 def chord_cost(
     side: int, strikes: NDArray[np.int64], config: FingeringConfig
 ) -> NDArray[np.float64]:
-    """(O,) cost [key-frames] of holding the keys (O, 5) of each finger, `KEYS` for none.
+    """Cost of the stretch between the fingers of one hand.
 
-    Infinite where the hand cannot reach them all.
+    Args:
+        side: `LEFT` or `RIGHT`.
+        strikes: (O, 5) key of each finger, `KEYS` for none.
+        config: the costs.
+
+    Returns:
+        (O,) [key-frames]; infinite where the hand cannot reach all keys.
     """
     pair = pair_cost(side, config.strain, config.stretch)
     cost = np.zeros(len(strikes))
@@ -113,7 +143,13 @@ def chord_cost(
 
 @cache
 def pair_cost(side: int, strain: float, limit: float) -> NDArray[np.float64]:
-    """(5, 5, 89, 89) cost [key-frames] of two fingers on two keys, inf out of reach."""
+    """(5, 5, 89, 89) Cost of two fingers on two keys [key-frames]; infinite out of reach.
+
+    Args:
+        side: `LEFT` or `RIGHT`.
+        strain: factor of the square of the stretch.
+        limit: factor of its fourth power.
+    """
     share = stretch(side)
     cost: NDArray[np.float64] = strain * share**2 + limit * share**4
     return cost
@@ -126,20 +162,20 @@ def hand_cost(
     struck: Struck,
     config: FingeringConfig,
 ) -> HandCost:
-    """What each of O ways to strike keys costs a hand, after each of B partial fingerings.
+    """Cost of each of O ways to strike keys with one hand, after each of B partial fingerings.
 
     Args:
         side: `LEFT` or `RIGHT`.
-        fingers: where the hand's fingers are.
-        strikes: (O, 5) the key each finger is to strike, `KEYS` for none.
-        struck: when, and what all of it is worth.
+        fingers: state of the hand's fingers.
+        strikes: (O, 5) key that each finger strikes, `KEYS` for none.
+        struck: the onset, its keys and the value of the frames.
         config: the costs.
     """
     strike = strikes < KEYS
     held: NDArray[np.bool_] = fingers.until > struck.onset
     cost = struck.unit * chord_cost(side, strikes, config)[None].repeat(len(held), axis=0)
 
-    # A held finger lets go where that costs less than holding on, or when it is to strike.
+    # A finger releases its key where holding it costs more, or where it has to strike another.
     holding = struck.unit * _holding_cost(side, strikes, np.where(held, fingers.key, KEYS), config)
     rest = struck.lost(struck.onset, fingers.until) + config.cut * struck.unit
     rest = np.where(held, rest, 0.0)[:, None]
@@ -147,21 +183,21 @@ def hand_cost(
     kept = held[:, None] & ~release
     cost += np.where(release, rest, np.where(kept, holding, 0.0)).sum(axis=2)
 
-    # Where the hand then is.
+    # The hand's new position.
     along = key_centres()[:, 1]
     ease = EASE if side == RIGHT else -EASE
     busy = strike | kept
     at = along[np.where(strike, np.minimum(strikes, KEYS - 1), fingers.key[:, None])]
-    wish = np.where(busy, at - ease, 0.0).sum(axis=2) / np.maximum(busy.sum(axis=2), 1)
+    relaxed = np.where(busy, at - ease, 0.0).sum(axis=2) / np.maximum(busy.sum(axis=2), 1)
     before = fingers.centre[:, None]
-    centre = np.where(busy.any(axis=2), wish, before)
+    centre = np.where(busy.any(axis=2), relaxed, before)
 
     travel, early, late = _travel_cost(
         np.abs(centre - before), fingers, release, strikes, struck, config
     )
     cost += travel
 
-    # A finger that goes to another key, on top of what the hand carries it.
+    # Fingers that change keys, in addition to how far the hand carries them.
     idle = struck.onset - np.minimum(fingers.until, struck.onset)[:, None]
     idle = np.maximum(idle, early[..., None]) + late[..., None] + 1
     hops = strike & (fingers.key[:, None] >= 0) & (strikes != fingers.key[:, None])
@@ -171,8 +207,8 @@ def hand_cost(
 
     thumb = np.minimum(strikes[:, 0], KEYS - 1)
     black_thumb = strike[:, 0] & np.take(BLACK, thumb)
-    dislike = config.weak_finger * strike[:, 3:].sum(axis=1) + config.thumb_on_black * black_thumb
-    cost += struck.unit * dislike
+    awkward = config.weak_finger * strike[:, 3:].sum(axis=1) + config.thumb_on_black * black_thumb
+    cost += struck.unit * awkward
     some: NDArray[np.bool_] = np.any(strike, axis=1)
     let_go = np.where(some[:, None], ~kept, release)
     return HandCost(cost, centre, let_go, early, late)
@@ -181,7 +217,7 @@ def hand_cost(
 def _holding_cost(
     side: int, strikes: NDArray[np.int64], holds: NDArray[np.int64], config: FingeringConfig
 ) -> NDArray[np.float64]:
-    """(B, O, 5) cost [key-frames] of each finger holding its key (B, 5) while others strike."""
+    """(B, O, 5) Cost [key-frames] of each finger holding its key (B, 5) while others strike."""
     pair = pair_cost(side, config.strain, config.stretch)
     cost = np.zeros((len(holds), len(strikes), FINGER_COUNT))
     for finger, other in permutations(range(FINGER_COUNT), 2):
@@ -197,43 +233,48 @@ def _travel_cost(
     struck: Struck,
     config: FingeringConfig,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Cost of moving the hand (B, O), and how early it leaves and late it arrives for that.
+    """Cost of moving a hand to the keys it strikes, with the cheapest times to leave and arrive.
 
-    What it leaves behind loses frames, and what it arrives at; the cheapest of all combinations
-    is taken. A hand that strikes nothing has all the time in the world.
+    Leaving early takes frames from the notes it releases, arriving late from those it strikes. A
+    hand that strikes nothing moves at no cost.
+
+    Returns:
+        (B, O) cost [key-frames], frames before the onset at which the hand leaves, and frames
+        after it at which the hand arrives.
     """
     onset, unit = struck.onset, struck.unit
     notes = (strikes < KEYS).sum(axis=1)
     released = release.sum(axis=2)
     held: NDArray[np.bool_] = fingers.until > onset
     freed = np.where(held, 0, fingers.until).max(axis=1)[:, None]
-    gap = onset - np.where(released, onset, freed)  # (B, O) frames that it has anyway
+    gap = onset - np.where(released, onset, freed)  # (B, O) frames without a held key
     early = np.arange(EARLY)[:, None, None]
     late = np.arange(LATE)
 
     # (EARLY, LATE, B, O)
     seconds = (np.maximum(gap, early)[:, None] + late[:, None, None] + 1) * FRAME_SECONDS
     effort = (distance / seconds / config.travel_speed) ** 2
-    # The first notes of a hand come as soon as they can rather than never: no others suffer.
+    # A hand's first notes are not dropped for the way to them: no other notes pay for it.
     first: NDArray[np.bool_] = np.all(fingers.key < 0, axis=1)[:, None]
     total = notes * unit * np.where(first, np.minimum(effort, config.drop / 2), effort)
 
-    # Leaving early takes frames from notes that end just before, or that are let go of.
+    # Leaving early takes frames from notes that end just before the onset, or are released.
     leave = onset - early
     mine = (fingers.key >= 0) & ~held & (fingers.until > leave)
     taken = np.where(mine, struck.lost(np.maximum(leave, 0), fingers.until), 0.0)
-    taken[mine & (fingers.since >= leave)] = np.inf  # nothing would be left of it
+    taken[mine & (fingers.since >= leave)] = np.inf  # nothing of the note would be left
     lost = taken.sum(axis=2)[:, :, None] + released * struck.lost(np.maximum(leave, 0), onset)
     newest = np.where(release, fingers.since[:, None], -1).max(axis=2)
     lost[(released > 0) & (newest >= leave)] = np.inf
-    # What the hand holds on to may itself have come late: it neither leaves before that,
+    # A key that the hand goes on holding may itself have been struck late: until then the hand
+    # can neither leave,
     newest_kept = np.where(held[:, None] & ~release, fingers.since[:, None], -1).max(axis=2)
     lost[(early > 0) & (newest_kept >= leave)] = np.inf
     total += lost[:, None]
-    # nor strikes anything else.
+    # nor strike another key.
     total += np.where(onset + late[:, None, None] < newest_kept, np.inf, 0.0)
 
-    # Arriving late, from all that it strikes.
+    # Arriving late takes frames from all notes that the hand strikes.
     ends = np.full(KEYS + 1, onset + LATE)
     ends[struck.keys] = struck.ends
     shortest = ends[strikes].min(axis=1) - onset

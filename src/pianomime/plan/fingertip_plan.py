@@ -1,6 +1,6 @@
-"""FingertipPlan: where every fingertip should be, and which key it presses, frame by frame.
+"""FingertipPlan: target of every fingertip, and the key it presses, frame by frame.
 
-It is what a planner hands to a tracker.
+A planner makes it from a Score; a tracker turns it into controls.
 """
 
 from __future__ import annotations
@@ -16,20 +16,28 @@ LEFT, RIGHT = 0, 1
 """Index of a hand in every plan array: keyboard order, bass side first."""
 
 POINTS = ("wrist", "thumb", "index", "middle", "ring", "little")
+"""Points of a hand, in the order of every array of points."""
 FINGERS = POINTS[1:]
+"""Fingers of a hand, in the order of every array of fingers."""
+
+HOVER_HEIGHT = 0.045
+"""[m] z of points that press nothing: twice the height of a key (paper, appendix A, step 4)."""
 
 
 @dataclass(frozen=True, eq=False)
 class FingertipPlan:
-    """Targets of both hands at 20 Hz.
+    """Targets of both hands in each of T frames of 0.05 s, and who plays each of N notes.
 
     Attributes:
-        fingertips: (T, 2, 6, 3) [m] in the world frame; hands (left, right); points as in
-            `POINTS`. A finger at z = 0 presses its key all the way down (paper, appendix A,
-            step 4); any other z is where the fingertip should hover.
-        finger_key: (T, 2, 5) int8; the key 0..87 that a finger presses in a frame, -1 for none.
-        note_hand: (N,) int8; for each note of the score, 0 left, 1 right, -1 not played.
-        note_finger: (N,) int8; for each note, 0 thumb .. 4 little, -1 not played.
+        fingertips: (T, 2, 6, 3) target positions [m], world frame; hands (left, right); points
+            as in `POINTS`. Fingertips at z = 0 press their key all the way down (paper,
+            appendix A, step 4); any other z is where the fingertip hovers.
+        finger_key: (T, 2, 5) int8; key 0..87 that each finger presses, -1 (`NO_KEY`) for none.
+        note_hand: (N,) int8; hand of each note of the score: 0 left, 1 right, -1 not played.
+        note_finger: (N,) int8; finger of each note: 0 thumb .. 4 little, -1 not played.
+
+    Raises:
+        ValueError: shapes do not match, or `fingertips` is not finite.
     """
 
     fingertips: NDArray[np.float64]
@@ -44,7 +52,7 @@ class FingertipPlan:
         if self.finger_key.shape != (frames, 2, 5):
             raise ValueError(f"finger_key must be ({frames}, 2, 5), not {self.finger_key.shape}")
         if self.note_hand.shape != self.note_finger.shape:
-            raise ValueError("note_hand and note_finger must have one entry a note each")
+            raise ValueError("note_hand and note_finger must both have one entry per note")
         if not np.isfinite(self.fingertips).all():
             raise ValueError("fingertips hold values that are not finite")
 
@@ -58,7 +66,7 @@ class FingertipPlan:
         return int((self.note_hand < 0).sum())
 
     def keys(self) -> NDArray[np.bool_]:
-        """(T, 88) bool: the keys that some finger is to press in each frame."""
+        """(T, 88) bool: keys that a finger should press in each frame."""
         down = np.zeros((len(self), KEYS), bool)
         frame, hand, finger = np.nonzero(self.finger_key >= 0)
         down[frame, self.finger_key[frame, hand, finger]] = True

@@ -1,4 +1,4 @@
-"""Where fingertips go for given fingers to press given keys: as the robot's hands can do it."""
+"""Smooth, feasible fingertip paths of the robot's hands for a given fingering."""
 
 from __future__ import annotations
 
@@ -12,35 +12,45 @@ from pianomime.keyboard import BLACK, NO_KEY
 from pianomime.plan.fingertip_plan import FingertipPlan
 from pianomime.plan.joint_path import KEY_REST, PathConfig, smooth_path
 from pianomime.world.hand import Hand
-from pianomime.world.layout import LAYOUT
+from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
 
-# Where along a white key each finger strikes it: in front of the black keys, thumb and little
-# finger, the short ones, nearest the player [m].
 _WHITE_X = np.array([0.052, 0.042, 0.040, 0.042, 0.048])
+"""(5,) World x at which each finger strikes white keys [m]: in front of the black keys, and the
+short fingers, thumb and little finger, nearest to the player."""
 _BLACK_X = np.array([0.004, 0.0, 0.0, 0.0, 0.004])
+"""(5,) World x at which each finger strikes black keys [m]."""
+_PRESS_DEPTH = 0.009
+"""[m] Depth of a pressing fingertip below the top of the resting key."""
+_APPROACH_FRAMES = 4
+"""Frames before a press in which the finger comes to its key."""
+# Deviation along x, y, z at which the cost of a fingertip's error is 1 [m].
+_PRESS_TOLERANCE = np.array([0.008, 0.0015, 0.001])
+_APPROACH_TOLERANCE = np.array([0.01, 0.003, 0.003])  # one frame before; grows with each
+_RELEASE_TOLERANCE = np.array([0.01, 0.004, 0.002])
 
 
 @dataclass(frozen=True)
 class HandPathConfig:
-    """Paths of hands over keys."""
+    """Paths of the hands over the keys."""
 
     path: PathConfig = field(
         default_factory=lambda: PathConfig(
             joint_acceleration=150.0, slide_acceleration=20.0, iterations=16
         )
     )
+    """Weights of the joint path that the fingertips follow."""
     hover: float = 0.010
-    """[m] that idle fingertips stay above the keys."""
+    """Height of idle fingertips above the keys [m]."""
     approach: float = 0.004
-    """[m] above its key that a finger waits in the frame before it presses."""
+    """Height of a fingertip above its key in the frame before it presses [m]."""
     lift: float = 0.003
-    """[m] above its key that a finger is in the frame after it let go."""
+    """Height of a fingertip above its key in the frame after it releases it [m]."""
     alike: float = 0.03
-    """[m] from where others had it, that counts as 1: of a fingertip that does nothing."""
+    """Deviation of an idle fingertip from the given hands at which its cost is 1 [m]."""
     alike_wrist: float = 0.05
-    """[m] the same of a forearm, along the keyboard."""
+    """Deviation of a wrist from the given hands along the keyboard at which its cost is 1 [m]."""
 
 
 def hand_paths(
@@ -48,18 +58,22 @@ def hand_paths(
     config: HandPathConfig | None = None,
     others: NDArray[np.floating] | None = None,
 ) -> NDArray[np.float64]:
-    """Fingertips (T, 2, 6, 3) [m] of hands that move smoothly from rest; z is 0 where they press.
+    """Points of both hands that move smoothly from rest and press the given keys.
 
     Args:
-        finger_key: (T, 2, 5) the key that each finger presses, -1 for none.
-        config: how.
-        others: (T, 2, 6, 3) points [m] that they stay near, if any, where they press nothing.
+        finger_key: (T, 2, 5) key that each finger presses, -1 for none.
+        config: heights and weights.
+        others: (T, 2, 6, 3) points of other hands, such as a human's, that wrists and idle
+            fingers stay near, world frame [m]; None for no such preference.
+
+    Returns:
+        (T, 2, 6, 3) points, world frame [m]; z is 0 for fingers that press.
     """
     config = config or HandPathConfig()
-    fingertips = np.empty((len(finger_key), 2, 6, 3))
+    fingertips = np.empty((len(finger_key), 2, POINT_COUNT, 3))
     for index, side in enumerate(SIDES):
         hand = Hand(side)
-        targets, weights, clearance = _wishes(finger_key[:, index], config)
+        targets, weights, clearance = _targets(finger_key[:, index], config)
         if others is not None:
             idle = (weights == 0).all(axis=2)
             idle[:, 0] = False
@@ -76,48 +90,57 @@ def hand_paths(
 
 
 def make_feasible(plan: FingertipPlan, config: HandPathConfig | None = None) -> FingertipPlan:
-    """A human's plan as the robot's hands can do it: the same fingers on the same keys.
+    """Retarget a human's plan to the robot's hands: the same fingers on the same keys.
 
-    Human hands have other proportions, and what was seen of them is not exact. All that is taken
-    of where the fingertips were is where hands and idle fingers are, and that only about.
+    Human hands have other proportions, and their tracking is inexact. Fingering is kept as it is;
+    fingertip positions are only a soft target of the wrists and of idle fingers.
+
+    Args:
+        plan: the human's plan.
+        config: heights and weights.
     """
     return replace(plan, fingertips=hand_paths(plan.finger_key, config, plan.fingertips))
 
 
-def _wishes(
+def _targets(
     finger_key: NDArray[np.int8], config: HandPathConfig
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Targets, weights and clearance of one hand's points, from the keys (T, 5) it presses."""
+    """Targets, weights and clearance of one hand, as `smooth_path` takes them.
+
+    Args:
+        finger_key: (T, 5) key that each finger presses, -1 for none.
+        config: heights.
+    """
     frames = len(finger_key)
-    targets = np.zeros((frames, 6, 3))
-    weights = np.zeros((frames, 6, 3))
-    clearance = np.full((frames, 5), config.hover)
+    targets = np.zeros((frames, POINT_COUNT, 3))
+    weights = np.zeros((frames, POINT_COUNT, 3))
+    clearance = np.full((frames, FINGER_COUNT), config.hover)
     centres = key_centres()
-    for finger in range(5):
+    for finger in range(FINGER_COUNT):
         for first, end, key in _presses(finger_key[:, finger]):
             point = np.array(
                 [(_BLACK_X if BLACK[key] else _WHITE_X)[finger], centres[key, 1], KEY_REST[key]]
             )
             down = slice(first, end)
-            targets[down, finger + 1] = point - [0.0, 0.0, 0.009]
-            weights[down, finger + 1] = 1 / np.array([0.008, 0.0015, 0.001])
+            targets[down, finger + 1] = point - [0.0, 0.0, _PRESS_DEPTH]
+            weights[down, finger + 1] = 1 / _PRESS_TOLERANCE
             clearance[down, finger] = np.nan
-            for lead in range(1, 5):
+            for lead in range(1, _APPROACH_FRAMES + 1):
                 frame = first - lead
                 if frame < 0 or finger_key[frame, finger] != NO_KEY:
                     break
                 targets[frame, finger + 1] = point + [0, 0, config.approach * lead]
-                weights[frame, finger + 1] = 1 / (np.array([0.01, 0.003, 0.003]) * lead)
+                weights[frame, finger + 1] = 1 / (_APPROACH_TOLERANCE * lead)
                 clearance[frame, finger] = min(config.hover, config.approach * lead)
             if end < frames and finger_key[end, finger] == NO_KEY:
                 targets[end, finger + 1] = point + [0, 0, config.lift]
-                weights[end, finger + 1] = 1 / np.array([0.01, 0.004, 0.002])
+                weights[end, finger + 1] = 1 / _RELEASE_TOLERANCE
                 clearance[end, finger] = config.lift
     return targets, weights, clearance
 
 
 def _presses(keys: NDArray[np.int8]) -> list[tuple[int, int, int]]:
-    """Runs (first frame, end, key) of one finger's keys (T,)."""
+    """Presses (first frame, end, key) of one finger, given its keys (T,)."""
     edges = np.flatnonzero(np.diff(keys, prepend=NO_KEY, append=NO_KEY))
     return [
         (int(first), int(end), int(keys[first]))

@@ -1,7 +1,9 @@
-"""A smooth path of joint positions that leads fingertips through their targets.
+"""Trajectory optimisation: a smooth joint path that takes the fingertips through their targets.
 
-Inverse kinematics over a whole piece at once: every frame sees what comes later, so a hand sets
-off for a leap in time, and fingers that do not play stay out of the way.
+One damped Gauss-Newton problem over all frames of a piece: squared tracking errors and squared
+accelerations are minimised together. A hand therefore starts moving before a leap, and fingers
+that do not play stay out of the way. Each step is one banded Cholesky solve, so the time grows
+linearly with the length of the piece.
 """
 
 from __future__ import annotations
@@ -17,52 +19,55 @@ from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import key_centres, key_half_sizes
 
-HOME = np.array(
-    [0.0, 0.0, -0.01, -0.1, -0.05]
-    + [0.0, 0.83, 0.65, 0.65]
-    + [0.0, 0.79, 0.61, 0.61]
-    + [0.0, 0.76, 0.57, 0.57]
-    + [0.05, 0.0, 0.74, 0.55, 0.55]
-    + [0.13, 0.84, 0.0, 0.0, 0.2]
-)
-"""(27,) joint positions of a hand curved over the keys, for either hand [rad, m]."""
+_HOME_POSE = {
+    "forearm_tz": -0.01,
+    "WRJ2": -0.1,
+    "WRJ1": -0.05,
+    **{"FFJ3": 0.83, "FFJ2": 0.65, "FFJ1": 0.65},
+    **{"MFJ3": 0.79, "MFJ2": 0.61, "MFJ1": 0.61},
+    **{"RFJ3": 0.76, "RFJ2": 0.57, "RFJ1": 0.57},
+    **{"LFJ5": 0.05, "LFJ3": 0.74, "LFJ2": 0.55, "LFJ1": 0.55},
+    **{"THJ5": 0.13, "THJ4": 0.84, "THJ1": 0.2},
+}
+"""Joint positions that are not 0 with the fingers curved over the keys [rad, m]."""
+HOME: NDArray[np.float64] = np.array([_HOME_POSE.get(name, 0.0) for name in LAYOUT.joint_names])
+"""(27,) Home pose of either hand, the fingers curved over the keys [rad, m]."""
 
 TIP_RADIUS = 0.0085
-"""[m] From a fingertip's site to where it touches a key."""
+"""[m] Distance from a fingertip's site to the surface that touches a key."""
 WHITE_REST, BLACK_REST = (
     float(key_centres()[key, 2] + key_half_sizes()[key, 2]) + TIP_RADIUS for key in (0, 1)
 )
-"""[m] Height of a fingertip's site when it rests on a white or a black key."""
+"""[m] Height of a fingertip's site when the finger rests on a white or on a black key."""
 KEY_REST = np.where(BLACK, BLACK_REST, WHITE_REST)
-"""(88,) [m] The same, key by key."""
+"""(88,) [m] Height of a fingertip's site when the finger rests on each key."""
 
-# Joints 2 and 1 of each finger hang on one tendon and turn together when nothing touches them.
 _HELD = 1e9
-_COUPLED = [(7, 8), (11, 12), (15, 16), (20, 21)]
+"""Stiffness that keeps a joint at its limit during one step."""
 
 
 @dataclass(frozen=True)
 class PathConfig:
-    """How a path weighs its wishes; each weight is one over a deviation that counts as 1."""
+    """Weights of the terms of the path: the deviation at which each term's cost is 1."""
 
     slide_acceleration: float = 40.0
-    """[m/s^2] of the forearm."""
+    """Acceleration of the forearm's slides [m/s^2]."""
     joint_acceleration: float = 400.0
-    """[rad/s^2] of wrist and fingers."""
+    """Acceleration of the joints of wrist and fingers [rad/s^2]."""
     posture: float = 3.0
-    """[rad] away from the home pose."""
+    """Deviation of a joint from the home pose [rad]."""
     slide_posture: float = 0.1
-    """[m] of the forearm toward and away from the piano."""
+    """Displacement of the forearm toward the piano and upward from the home pose [m]."""
     coupling: float = 0.15
-    """[rad] between the two end joints of a finger."""
+    """Difference between the two coupled end joints of a finger [rad]."""
     floor: float = 0.002
-    """[m] below the floor that keeps idle fingertips off the keys."""
+    """Depth of an idle fingertip below its clearance above the keys [m]."""
     damping: float = 0.3
-    """[rad, m] of a joint in one step."""
+    """Displacement of a joint in one Gauss-Newton step [rad, m]."""
     step: float = 0.4
-    """[rad, m] that a joint moves at most in one step."""
+    """Largest displacement of a joint in one Gauss-Newton step [rad, m]."""
     iterations: int = 10
-    """Gauss-Newton steps."""
+    """Number of Gauss-Newton steps."""
 
 
 def smooth_path(
@@ -73,16 +78,17 @@ def smooth_path(
     clearance: NDArray[np.float64],
     config: PathConfig | None = None,
 ) -> NDArray[np.float64]:
-    """Joint positions at the end of each of T frames.
+    """Optimise the joint positions of one hand at the end of each of T frames.
 
     Args:
-        hand: whose path.
-        start: (27,) joint positions before the first frame, where the hand rests.
-        targets: (T, 6, 3) [m] where wrist and fingertips should be at the end of each frame.
-        weights: (T, 6, 3) [1/m] one over the deviation from the target that counts as 1.
-        clearance: (T, 5) [m] how far above the keys a fingertip should stay; nan for fingers
+        hand: the hand that moves.
+        start: (27,) joint positions before the first frame, where the hand is at rest [rad, m].
+        targets: (T, 6, 3) target positions of wrist and fingertips at the end of each frame,
+            world frame [m].
+        weights: (T, 6, 3) weight of each coordinate's error, 0 for none [1/m].
+        clearance: (T, 5) least height of each fingertip above the keys [m]; NaN for fingers
             that may go down.
-        config: the other weights.
+        config: weights of the other terms.
 
     Returns:
         (T + 1, 27) joint positions [rad, m]; the first row is `start`.
@@ -94,7 +100,7 @@ def smooth_path(
     stiffness = _acceleration_weights(config)
     home = np.clip(HOME, hand.low, hand.high)
     path = np.tile(home, (frames, 1))
-    path[:, 0] = _slide_guess(hand, targets, weights)
+    path[:, LAYOUT.slide] = _slide_guess(hand, targets, weights)
     damping = config.damping**-2
     for _ in range(config.iterations):
         gradient = np.empty((frames, LAYOUT.hand_joints))
@@ -103,16 +109,16 @@ def smooth_path(
             points, jacobian = hand.points_and_jacobian(path[frame])
             error = (points - targets[frame]) * weights[frame]
             rows = jacobian * weights[frame][..., None]
-            lack = points[1:, 2] - clearance[frame] - resting_height(points[1:, 0])
-            below = lack < 0.0
-            error[1:, 2][below] = lack[below] / config.floor
+            height = points[1:, 2] - clearance[frame] - resting_height(points[1:, 0])
+            below = height < 0.0
+            error[1:, 2][below] = height[below] / config.floor
             rows[1:, 2][below] = jacobian[1:, 2][below] / config.floor
             rows = rows.reshape(-1, LAYOUT.hand_joints)
             blocks[frame] = rows.T @ rows
             gradient[frame] = rows.T @ error.ravel()
         gradient += posture * (path - home) + path @ coupling
         blocks += np.diag(posture + damping) + coupling
-        # A joint at a limit that it is pushed against stays there for this step.
+        # A joint that is pushed against its limit stays there for this step.
         held = ((path <= hand.low) & (gradient > 0)) | ((path >= hand.high) & (gradient < 0))
         blocks[:, np.arange(LAYOUT.hand_joints), np.arange(LAYOUT.hand_joints)] += held * _HELD
         step = _step(blocks, gradient, stiffness, path, start)
@@ -121,9 +127,15 @@ def smooth_path(
 
 
 def resting_height(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Height [m] of a fingertip's site when it rests on the keys at `x` [m].
+    """Height of a fingertip's site when the finger rests on the keys at `x`.
 
-    The black keys' tops count wherever a fingertip could touch one.
+    It blends from white to black keys where a fingertip begins to reach over the black ones.
+
+    Args:
+        x: world x of fingertips, any shape [m].
+
+    Returns:
+        World z, of the same shape [m].
     """
     onto_black = np.clip((0.03 - x) / 0.01, 0.0, 1.0)
     return WHITE_REST + (BLACK_REST - WHITE_REST) * onto_black
@@ -131,14 +143,15 @@ def resting_height(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _posture_weights(config: PathConfig) -> NDArray[np.float64]:
     weights = np.full(LAYOUT.hand_joints, config.posture**-2)
-    weights[0] = 0.0
-    weights[1:3] = config.slide_posture**-2
+    weights[LAYOUT.slides] = config.slide_posture**-2
+    weights[LAYOUT.slide] = 0.0
     return weights
 
 
 def _coupling_hessian(config: PathConfig) -> NDArray[np.float64]:
     hessian = np.zeros((LAYOUT.hand_joints, LAYOUT.hand_joints))
-    for one, other in _COUPLED:
+    # The end joints of a finger share a tendon and turn together when nothing touches them.
+    for one, other in LAYOUT.coupled:
         pair = np.ix_([one, other], [one, other])
         hessian[pair] += np.array([[1.0, -1.0], [-1.0, 1.0]]) / config.coupling**2
     return hessian
@@ -147,7 +160,11 @@ def _coupling_hessian(config: PathConfig) -> NDArray[np.float64]:
 def _slide_guess(
     hand: Hand, targets: NDArray[np.float64], weights: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(T,) [m] forearms start over the middle of their fingers' targets, or on the way there."""
+    """(T,) First guess of the slide along the keyboard [m].
+
+    It puts the hand over the weighted mean of its fingers' targets, and interpolates between
+    frames that have any.
+    """
     home = np.clip(HOME, hand.low, hand.high)
     weight = weights[:, 1:, 1]
     total = weight.sum(axis=1)
@@ -161,9 +178,10 @@ def _slide_guess(
 
 
 def _acceleration_weights(config: PathConfig) -> NDArray[np.float64]:
-    scale = np.full(LAYOUT.hand_joints, config.joint_acceleration)
-    scale[:3] = config.slide_acceleration
-    weights: NDArray[np.float64] = (scale * FRAME_SECONDS**2) ** -2
+    """(27,) Weight of each joint's squared second difference between frames."""
+    acceleration = np.full(LAYOUT.hand_joints, config.joint_acceleration)
+    acceleration[LAYOUT.slides] = config.slide_acceleration
+    weights: NDArray[np.float64] = (acceleration * FRAME_SECONDS**2) ** -2
     return weights
 
 
@@ -174,13 +192,13 @@ def _step(
     path: NDArray[np.float64],
     start: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """The Gauss-Newton step (T, 27): frames are tied together by their second differences.
+    """(T, 27) The Gauss-Newton step [rad, m].
 
-    Each joint's second differences tie it to itself two frames away, so that the matrix has a
-    band of 2 x 27 below its diagonal.
+    Second differences couple each joint with itself up to two frames away, so the matrix has
+    2 x 27 bands below its diagonal.
     """
     frames = len(path)
-    # The hand sets off from rest: before the first frame it is at the start, twice.
+    # The hand starts from rest: in both frames before the first it is at the start.
     second = np.diff(np.vstack([start, start, path]), n=2, axis=0)
     second = np.vstack([second, np.zeros((2, LAYOUT.hand_joints))])
     gradient = gradient + stiffness * (second[:-2] - 2.0 * second[1:-1] + second[2:])
@@ -188,7 +206,7 @@ def _step(
     for below in range(LAYOUT.hand_joints):
         column = np.arange(LAYOUT.hand_joints - below)
         band[below][:, column] = blocks[:, column + below, column]
-    # A frame is part of its own second difference and, but for the last two, of the next two's.
+    # A frame is in its own second difference and, except the last two, in those of the next two.
     later, latest = ((np.arange(frames) < frames - lag)[:, None] for lag in (1, 2))
     ties = (1.0 + 4.0 * later + latest, -2.0 * later - 2.0 * latest, 1.0 * latest)
     for lag in range(3):

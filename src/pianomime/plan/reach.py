@@ -1,4 +1,4 @@
-"""How near and how far two fingers of a hand can hold keys, from the hand's kinematics.
+"""Smallest and largest distance at which two fingers of a hand can hold two keys.
 
 The distances in `reach.json` are measured by inverse kinematics (`benchmarks/reach.py`).
 """
@@ -15,28 +15,30 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import BLACK, KEYS
 from pianomime.plan.fingertip_plan import LEFT
+from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.parameters import key_centres
 
-_FIGURES: dict[str, Any] = json.loads(
+_REACH: dict[str, Any] = json.loads(
     resources.files("pianomime.plan").joinpath("reach.json").read_text("utf-8")
 )
 
-EASE: NDArray[np.float64] = np.array(_FIGURES["ease"])
-"""(5,) [m] where the fingertips of a right hand at ease lie along the keyboard, from the middle
-finger; those of a left hand lie the other way."""
+EASE: NDArray[np.float64] = np.array(_REACH["ease"])
+"""(5,) [m] Distance of each fingertip from the middle finger along the keyboard, in a relaxed right
+hand; that of a left hand has the opposite sign."""
 
 
 def pair_limits(low: int, high: int, low_black: bool, high_black: bool) -> tuple[float, float]:
     """The smallest and the largest distance [m] at which two fingers can hold keys.
 
     Args:
-        low: a finger of a right hand, 0 thumb .. 4 little, and
-        high: one further from the thumb.
-        low_black: whether `low` is on a black key, and
-        high_black: whether `high` is.
+        low: finger of a right hand, 0 thumb .. 4 little.
+        high: another finger, further from the thumb.
+        low_black: whether `low` is on a black key.
+        high_black: whether `high` is on a black key.
 
     Returns:
-        Distances along the keyboard from `low` to `high`; negative where the fingers cross.
+        Smallest and largest distance along the keyboard from `low` to `high` [m]; negative where
+        the fingers cross.
     """
     return _limits()[low, high, low_black, high_black]
 
@@ -44,27 +46,27 @@ def pair_limits(low: int, high: int, low_black: bool, high_black: bool) -> tuple
 @cache
 def _limits() -> dict[tuple[int, int, bool, bool], tuple[float, float]]:
     return {
-        (*row["fingers"], *row["black"]): (row["least"], row["most"]) for row in _FIGURES["pairs"]
+        (*row["fingers"], *row["black"]): (row["least"], row["most"]) for row in _REACH["pairs"]
     }
 
 
 @cache
 def stretch(side: int) -> NDArray[np.float64]:
-    """How far a hand is stretched, or its fingers crossed, to hold two keys.
+    """How far a hand is stretched, or its fingers are crossed, to hold two keys.
 
     Args:
         side: `LEFT` or `RIGHT`.
 
     Returns:
-        (5, 5, 89, 89): for two fingers and their keys, 0 where they lie as in a hand at ease,
-        1 at the limit of reach, inf beyond it; 0 for a finger and itself. The 89th key is "none".
-        Read-only.
+        (5, 5, 89, 89) by finger, other finger, key and other key: 0 where the fingers lie as in
+        a relaxed hand, 1 at the limit of reach, inf beyond it. It is 0 for a finger and itself,
+        and for the 89th key, which stands for no key. Read-only.
     """
     along = key_centres()[:, 1]
-    table = np.zeros((5, 5, KEYS + 1, KEYS + 1))
+    table = np.zeros((FINGER_COUNT, FINGER_COUNT, KEYS + 1, KEYS + 1))
     black = BLACK.astype(int)
-    for low in range(5):
-        for high in range(low + 1, 5):
+    for low in range(FINGER_COUNT):
+        for high in range(low + 1, FINGER_COUNT):
             distance = along[None, :] - along[:, None]  # from the key of `low` to that of `high`
             if side == LEFT:
                 distance = -distance
