@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import signal
 import subprocess
@@ -9,15 +8,17 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pianomime import evaluate, songs
 from pianomime.errors import InputError
 from pianomime.evaluation.evaluation import markdown
-from pianomime.evaluation.song_worker import SongWorker
+from pianomime.evaluation.song_worker import SONG_WORKER
 from pianomime.policies.methods import WEIGHTS
 from pianomime.songs.find import find_songs
+from pianomime.workers import Worker
 
 
 @pytest.fixture
@@ -32,7 +33,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Path) -> None:
-    told: list[tuple[int, int, float]] = []
+    told: list[tuple[Any, ...]] = []
     out = tmp_path / "out"
     results = evaluate(
         [folder], seconds=1.0, jobs=2, out=out, progress=lambda *step: told.append(step)
@@ -50,8 +51,8 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     assert results["mean"]["f1"] == pytest.approx(mean, abs=1e-6)
     assert {row["effort"] for row in rows.values()} == {results["effort"]}
     assert "effort" not in results["mean"]
-    assert [step[:2] for step in told] == [(n, 6) for n in range(7)]
-    assert told[-1][2] == pytest.approx(mean)
+    assert [step[:3] for step in told] == [("songs", n, 6) for n in range(7)]
+    assert told[-1][3] == f"mean F1 {mean:.3f}"
 
     for kind in ("missed", "wrong"):
         lost = sum(sum(row["causes"][kind].values()) for row in rows.values())
@@ -124,12 +125,12 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
 
 def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
-    with SongWorker("zero-shot", 0, 1.0) as worker:
-        assert "f1" in worker.play(song)
+    setup = {"player": "zero-shot", "effort": 0, "seed": 0, "seconds": 1.0}
+    with Worker(SONG_WORKER, setup) as worker:
+        assert "f1" in worker.ask(str(song))
         os.kill(worker.pid, signal.SIGKILL)
-        crashed = worker.play(song)
-        assert crashed == {"song": song.stem, "error": "its process died (exit code -9)"}
-        assert "f1" in worker.play(song)
+        assert worker.ask(str(song)) == {"error": "its process died (exit code -9)"}
+        assert "f1" in worker.ask(str(song))
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
@@ -137,17 +138,17 @@ def test_no_process_outlives_a_run_that_stops(
     error: type[BaseException], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     started: list[subprocess.Popen[str]] = []
-    start = SongWorker._start
+    start = Worker._start
 
-    def note(worker: SongWorker) -> subprocess.Popen[str]:
+    def note(worker: Worker) -> subprocess.Popen[str]:
         started.append(start(worker))
         return started[-1]
 
-    def stop(done: int, total: int, f1: float) -> None:
+    def stop(phase: str, done: int, total: int, remark: str = "") -> None:
         if done:
             raise error
 
-    monkeypatch.setattr(SongWorker, "_start", note)
+    monkeypatch.setattr(Worker, "_start", note)
     before = set(threading.enumerate())
     with pytest.raises(error):
         evaluate(folder, seconds=1.0, jobs=2, effort=0, progress=stop)
@@ -192,17 +193,17 @@ def test_progress_is_told_before_any_process_works_and_has_no_mean_before_the_fi
 ) -> None:
     (tmp_path / "1.mid").write_text("this is no music")
     (tmp_path / "2.mid").write_bytes(songs.path(songs.names()[0]).read_bytes())
-    told: list[tuple[int, int, float]] = []
-    start = SongWorker._start
+    told: list[tuple[Any, ...]] = []
+    start = Worker._start
 
-    def note(worker: SongWorker) -> subprocess.Popen[str]:
-        assert told == [(0, 2, pytest.approx(math.nan, nan_ok=True))]
+    def note(worker: Worker) -> subprocess.Popen[str]:
+        assert told == [("songs", 0, 2, "")]
         return start(worker)
 
-    monkeypatch.setattr(SongWorker, "_start", note)
+    monkeypatch.setattr(Worker, "_start", note)
     results = evaluate(
         tmp_path, seconds=1.0, jobs=1, effort=0, progress=lambda *step: told.append(step)
     )
-    assert [step[:2] for step in told] == [(0, 2), (1, 2), (2, 2)]
-    assert math.isnan(told[1][2])
-    assert told[2][2] == pytest.approx(results["mean"]["f1"], abs=1e-6)
+    f1 = results["mean"]["f1"]
+    remarks = ["", "", f"mean F1 {f1:.3f}"]
+    assert told == [("songs", done, 2, remark) for done, remark in enumerate(remarks)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -53,20 +52,16 @@ class Evaluate:
 
         seeded = f"-seed{self.seed}" if self.seed else ""
         out = self.out or Path("out", f"evaluate-{self.player}-{self.effort}{seeded}")
-        with bars() as tell:
+        with bars() as progress:
             results = evaluate(
                 self.paths,
                 self.player,
                 self.seconds,
                 self.jobs,
                 out,
-                progress=lambda done, total, f1: tell("songs", done, total, _remark(f1)),
+                progress=progress,
                 effort=self.effort,
                 seed=self.seed,
             )
         print(markdown(results))
         print(f"saved: {out / 'results.json'}")
-
-
-def _remark(f1: float) -> str:
-    return "" if math.isnan(f1) else f"mean F1 {f1:.3f}"

@@ -4,32 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
 
 from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
-    Progress,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.progress import Progress as Bars
 
-
-class Tell(Protocol):
-    """What to call to move a bar."""
-
-    def __call__(self, stage: str, done: int, total: int, remark: str = "") -> None:
-        """Tell the stage, the steps done, the steps in all (0: unknown) and a remark."""
+from pianomime.progress import Progress
 
 
 @contextmanager
-def bars() -> Iterator[Tell]:
-    """Show one bar a stage; a stage of unknown length pulses until the next one begins."""
+def bars() -> Iterator[Progress]:
+    """Show one bar a phase; a phase of unknown length pulses until the next one begins."""
     console = Console(stderr=True)
-    with Progress(
+    with Bars(
         TextColumn("{task.description:<10}"),
         BarColumn(),
         MofNCompleteColumn(),
@@ -40,15 +34,15 @@ def bars() -> Iterator[Tell]:
         console=console,
         transient=True,
         disable=not console.is_terminal,
-    ) as progress:
+    ) as shown:
         current: tuple[str, TaskID] | None = None
 
-        def tell(stage: str, done: int, total: int, remark: str = "") -> None:
+        def progress(phase: str, done: int, total: int, remark: str = "") -> None:
             nonlocal current
-            if current is None or current[0] != stage:
+            if current is None or current[0] != phase:
                 if current is not None:
-                    progress.remove_task(current[1])
-                current = stage, progress.add_task(stage, total=total or None, remark=remark)
-            progress.update(current[1], completed=done, total=total or None, remark=remark)
+                    shown.remove_task(current[1])
+                current = phase, shown.add_task(phase, total=total or None, remark=remark)
+            shown.update(current[1], completed=done, total=total or None, remark=remark)
 
-        yield tell
+        yield progress

@@ -6,11 +6,8 @@ import contextlib
 import hashlib
 import json
 import math
-import os
-import queue
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Iterable
 from contextlib import closing
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -18,12 +15,14 @@ from typing import Any
 
 import pianomime
 from pianomime.errors import InputError
-from pianomime.evaluation.song_worker import SongWorker
+from pianomime.evaluation.song_worker import SONG_WORKER
 from pianomime.files import atomic
 from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.players.player import EFFORT, Player, check_player
 from pianomime.policies.methods import weight_files
+from pianomime.progress import Progress, no_progress
 from pianomime.songs.find import find_songs
+from pianomime.workers import cores, work
 
 Row = dict[str, Any]
 """The numbers of one song (see `pianomime.evaluation.summary`) and its `causes` (see
@@ -32,9 +31,6 @@ Row = dict[str, Any]
 # Those that decide how a song is played.
 _LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy", "symusic")
 
-Progress = Callable[[int, int, float], None]
-"""Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
-
 
 def evaluate(
     paths: str | Path | Iterable[str | Path],
@@ -42,7 +38,7 @@ def evaluate(
     seconds: float = EXCERPT_SECONDS,
     jobs: int | None = None,
     out: str | Path | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
     effort: int = EFFORT,
     seed: int = 0,
 ) -> dict[str, Any]:
@@ -59,7 +55,7 @@ def evaluate(
         jobs: processes; one a core that this one may use if None. They share the cores, so
             `realtime_factor` and the times depend on it.
         out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
-        progress: told how far it is.
+        progress: told the songs done, the songs in all and their mean F1 so far.
         effort: how hard the player tries, 0 to 3.
         seed: of what it draws.
 
@@ -91,12 +87,12 @@ def evaluate(
 
     rows: dict[Path, Row] = {}
 
-    def tell() -> None:
-        if progress is not None:
-            f1 = [row["f1"] for row in rows.values() if "error" not in row]
-            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else math.nan)
+    def report() -> None:
+        f1 = [row["f1"] for row in rows.values() if "error" not in row]
+        remark = f"mean F1 {sum(f1) / len(f1):.3f}" if f1 else ""
+        progress("songs", len(rows), len(songs), remark)
 
-    tell()
+    report()
 
     waiting = []
     for song in songs:
@@ -105,13 +101,15 @@ def evaluate(
             waiting.append(song)
         else:
             rows[song] = known
-            tell()
-    with closing(_play_all(waiting, player, effort, seconds, seed, jobs or _cores())) as played:
-        for song, row in played:
+            report()
+    setup = {"player": player, "effort": effort, "seed": seed, "seconds": seconds}
+    with closing(work(SONG_WORKER, waiting, jobs or cores(), setup, str)) as played:
+        for song, result in played:
+            row = {"song": song.stem, **result}
             if store is not None and "error" not in row:
                 store.put(song, row)
             rows[song] = row
-            tell()
+            report()
 
     results = {
         "player": player,
@@ -248,39 +246,3 @@ def _digest(files: Iterable[Path]) -> str:
     for file in files:
         digest.update(file.read_bytes())
     return digest.hexdigest()
-
-
-def _cores() -> int:
-    """The cores that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):  # Linux; a container often allows fewer than there are.
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def _play_all(
-    songs: list[Path], player: str, effort: int, seconds: float, seed: int, jobs: int
-) -> Generator[tuple[Path, Row], None, None]:
-    """Songs with their rows, in the order in which they finish."""
-    if not songs:
-        return
-    idle: queue.SimpleQueue[SongWorker] = queue.SimpleQueue()
-    workers = [SongWorker(player, effort, seconds, seed) for _ in range(min(jobs, len(songs)))]
-    for worker in workers:
-        idle.put(worker)
-
-    def play(song: Path) -> tuple[Path, Row]:
-        worker = idle.get()
-        try:
-            return song, worker.play(song)
-        finally:
-            idle.put(worker)
-
-    # The threads only wait for the processes.
-    threads = ThreadPoolExecutor(len(workers))
-    try:
-        for future in as_completed([threads.submit(play, song) for song in songs]):
-            yield future.result()
-    finally:
-        threads.shutdown(wait=False, cancel_futures=True)
-        for worker in workers:
-            worker.close()
