@@ -1,12 +1,14 @@
-"""Learning: environments, experts of one song, and the data they leave; torch is only here.
+"""Learning: environments, experts of one song, and policies of all songs; torch is only here.
 
-Importing it tells Gymnasium, where that is installed, of `pianomime/Song-v0`:
+Importing it registers `pianomime/Song-v0` with Gymnasium, where that is installed. Gymnasium 1.x
+does not look for environments of other packages, but imports the module before the colon:
 
     import gymnasium
-    import pianomime.learn
 
-    env = gymnasium.make("pianomime/Song-v0", demonstration="DEMO.npz")
-    envs = gymnasium.make_vec("pianomime/Song-v0", num_envs=32, demonstration="DEMO.npz")
+    env = gymnasium.make("pianomime.learn:pianomime/Song-v0", demonstration="DEMO.npz")
+    envs = gymnasium.make_vec(
+        "pianomime.learn:pianomime/Song-v0", num_envs=32, demonstration="DEMO.npz"
+    )
 """
 
 import contextlib

@@ -1,4 +1,8 @@
-"""What happens between updates of Stable-Baselines3, and what it takes to go on from there."""
+"""Callback of Stable-Baselines3 that saves checkpoints between updates and resumes from them.
+
+It reseeds all generators between updates, so that a resumed run equals an uninterrupted one bit
+for bit.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +17,17 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from pianomime.errors import InputError
 from pianomime.learn.envs.sb3_base import Sb3BaseEnv
+from pianomime.learn.runs.run import Checkpoint
 from pianomime.learn.runs.safetensors_file import Arrays
 
 
 class ResumableCallback(BaseCallback):
-    """What happens between updates: something is kept, and the next begins the same each time.
+    """Saves between updates, and makes each update depend on the saved state and the seed alone.
 
     Args:
-        env: where it learns.
-        seed: of all that is drawn.
-        steps_per_update: in all environments together.
+        env: what the model learns in.
+        seed: seed of all random numbers.
+        steps_per_update: control steps between updates, in all environments together.
     """
 
     def __init__(self, env: Sb3BaseEnv, seed: int, steps_per_update: int) -> None:
@@ -31,11 +36,16 @@ class ResumableCallback(BaseCallback):
         self._fresh = True
 
     @abstractmethod
-    def keep(self, update: int, steps: int) -> None:
-        """Keep what was learned in this many updates and steps."""
+    def save(self, update: int, steps: int) -> None:
+        """Save what was learned.
+
+        Args:
+            update: number of updates so far.
+            steps: number of control steps so far.
+        """
 
     def arrays(self) -> Arrays:
-        """Everything that is needed to go on."""
+        """Everything that a checkpoint holds: weights, optimizers and environments, by name."""
         weights = self.model.policy.state_dict()
         arrays = {f"policy/{name}": tensor.numpy() for name, tensor in weights.items()}
         for name, optimizer in self.optimizers().items():
@@ -45,14 +55,19 @@ class ResumableCallback(BaseCallback):
         return arrays | {f"env/{name}": array for name, array in self._env.state().items()}
 
     def optimizers(self) -> dict[str, torch.optim.Optimizer]:
-        """Those whose moments are kept, by name."""
+        """The optimizers whose state is saved, by name."""
         return {"adam": self.model.policy.optimizer}
 
     def resume(self, arrays: Arrays, steps: int, path: Path) -> None:
-        """Put model and environments where a checkpoint has them.
+        """Put the model and the environments into the state of a checkpoint.
+
+        Args:
+            arrays: as `arrays` gave them.
+            steps: number of control steps by then.
+            path: of the checkpoint, for messages.
 
         Raises:
-            InputError: it is that of another model.
+            InputError: it is the checkpoint of another model.
         """
         parts: dict[str, Arrays] = {}
         for name, array in arrays.items():
@@ -74,39 +89,39 @@ class ResumableCallback(BaseCallback):
         self._fresh = False
 
     def learn(
-        self, model: BaseAlgorithm, steps: int, state: tuple[Arrays, int] | None, path: Path
+        self, model: BaseAlgorithm, steps: int, state: Checkpoint | None, path: Path
     ) -> None:
-        """Have a model learn until it has done so many steps, from a checkpoint on if there is one.
+        """Train a model up to a number of steps, from a checkpoint on if there is one.
 
         Args:
             model: made for the environments.
-            steps: in all, those before the checkpoint among them.
-            state: the checkpoint, and the steps done by then.
-            path: of it.
+            steps: control steps in all, including those before the checkpoint.
+            state: arrays of the checkpoint and the steps by then; None to begin.
+            path: of the checkpoint, for messages.
 
         Raises:
-            InputError: it is that of another model.
+            InputError: it is the checkpoint of another model.
         """
         self.init_callback(model)
         if state is not None:
-            self.resume(*state, path)
-        # Steps that were taken before are added to those that it is told.
+            self.resume(state.arrays, state.steps, path)
+        # Stable-Baselines3 adds the steps that were taken before to this number.
         model.learn(steps - model.num_timesteps, self, reset_num_timesteps=state is None)
 
     def between_updates(self) -> None:
-        """Keep what was learned, and begin the next update."""
+        """Save, and seed the next update."""
         steps = self.model.num_timesteps
         update = steps // self._steps_per_update
-        # A checkpoint that was just read needs not be written again.
+        # A checkpoint that was just read need not be written again.
         if self._fresh:
             self._env.set_state(self._env.state())
-            self.keep(update, steps)
+            self.save(update, steps)
         self._fresh = True
-        draws = np.random.SeedSequence([self._seed, update]).generate_state(4).tolist()
-        torch.manual_seed(draws[0])
-        np.random.seed(draws[1])  # noqa: NPY002 - Stable-Baselines3 draws from it
-        random.seed(draws[2])
-        self._env.action_space.seed(draws[3])
+        seeds = np.random.SeedSequence([self._seed, update]).generate_state(4).tolist()
+        torch.manual_seed(seeds[0])
+        np.random.seed(seeds[1])  # noqa: NPY002 - Stable-Baselines3 uses it
+        random.seed(seeds[2])
+        self._env.action_space.seed(seeds[3])
         self._env.reseed(self._seed, update)
 
     def _on_rollout_start(self) -> None:

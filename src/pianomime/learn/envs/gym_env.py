@@ -1,7 +1,8 @@
-"""The environment of Gymnasium, `gymnasium.make("pianomime/Song-v0", demonstration=...)`."""
+"""The environment of Gymnasium, `gymnasium.make("pianomime.learn:pianomime/Song-v0", ...)`."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,65 +11,117 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from pianomime.errors import InputError
+from pianomime.keyboard import FRAME_RATE
 from pianomime.learn.envs.batch import SongBatch
-from pianomime.learn.envs.reference import load_song
-from pianomime.learn.expert.config import EnvConfig, preset_config
-from pianomime.learn.runs.validation import check_env
+from pianomime.learn.envs.config import EnvConfig, preset_env
+from pianomime.learn.envs.observation import ObservationTerm, observation_terms
+from pianomime.learn.envs.reference import load_demonstration
+from pianomime.learn.envs.reward import RewardTerm, reward_terms
 from pianomime.plan.demonstration import Demonstration
+from pianomime.world.render import Painter
+from pianomime.world.scene_look import key_colours
+
+RENDER_SIZE = (960, 408)
+"""Width and height of rendered frames [pixels]."""
 
 
 def make_batch(
     demonstration: Demonstration | str | Path,
     config: EnvConfig | str,
-    envs: int,
+    num_envs: int,
     threads: int = 0,
+    extra_rewards: Sequence[RewardTerm] = (),
+    extra_observations: Sequence[ObservationTerm] = (),
 ) -> SongBatch:
-    """A batch of what a caller named: a song or its file, a config or the name of a preset.
+    """A batch from what the constructors of environments take.
+
+    Args:
+        demonstration: what is played: a demonstration or its file, a MIDI file, or the name of a
+            bundled song.
+        config: settings of the environment, or the name of a preset.
+        num_envs: number of environments.
+        threads: how many worlds step at the same time; 0 for one on each core.
+        extra_rewards: terms that are added to those of the config.
+        extra_observations: terms that follow those of the config.
 
     Raises:
-        InputError: one of them cannot be used.
+        InputError: the song cannot be used, there is no such preset, or two terms have the same
+            name.
     """
-    song = demonstration if isinstance(demonstration, Demonstration) else load_song(demonstration)
-    chosen = preset_config(config).env if isinstance(config, str) else config
-    check_env(chosen)
-    return SongBatch(song, chosen, envs, threads)
+    if not isinstance(demonstration, Demonstration):
+        demonstration = load_demonstration(demonstration)
+    settings = preset_env(config) if isinstance(config, str) else config
+    return SongBatch(
+        demonstration,
+        settings,
+        num_envs,
+        threads,
+        (*reward_terms(settings.reward), *extra_rewards),
+        (*observation_terms(settings.observation), *extra_observations),
+    )
 
 
 def observation_space(batch: SongBatch) -> spaces.Box:
-    """Of one environment."""
+    """The observation space of one environment."""
     return spaces.Box(-np.inf, np.inf, (batch.observer.size,), np.float32)
 
 
 def action_space(batch: SongBatch) -> spaces.Box:
-    """Of one environment."""
-    return spaces.Box(-1.0, 1.0, (batch.actions,), np.float32)
+    """The action space of one environment."""
+    return spaces.Box(-1.0, 1.0, (batch.action_size,), np.float32)
 
 
 class SongEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
-    """One song, played by adding residuals to what a tracker proposes.
+    """One song, played by adding residuals to the controls of a base controller.
 
-    An episode terminates with the song and is truncated at the longest length of an episode.
-    `info` holds the frame that comes next, the F1 of the episode so far and its blow-ups.
+    An episode terminates with the song and is truncated after `episode.frames` frames. `info` has
+    the frame that comes next (`frame`), the F1 of the episode so far (`f1`), the frames in which
+    the physics broke (`blow_ups`) and what each reward term gave, times its weight
+    (`reward/press`, `reward/mimic`, ...). `print` shows the table of terms.
 
     Args:
         demonstration: what is played: a demonstration or its file, a MIDI file, or the name of
             a bundled song.
-        config: the environment's config, or the name of a preset.
+        config: settings of the environment, or the name of a preset.
+        render_mode: "rgb_array" for `render` to return pictures (408, 960, 3) uint8; needs OpenGL.
+        extra_rewards: terms that are added to those of the config.
+        extra_observations: terms that follow those of the config in the observation.
+
+    Raises:
+        InputError: the song cannot be used, there is no such preset or render mode, or two terms
+            have the same name.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - so it is in Gymnasium
+    metadata: dict[str, Any] = {  # noqa: RUF012 - Gymnasium declares it so
+        "render_modes": ["rgb_array"],
+        "render_fps": int(FRAME_RATE),
+    }
 
     def __init__(
-        self, demonstration: Demonstration | str | Path, config: EnvConfig | str = "paper"
+        self,
+        demonstration: Demonstration | str | Path,
+        config: EnvConfig | str = "paper",
+        render_mode: str | None = None,
+        extra_rewards: Sequence[RewardTerm] = (),
+        extra_observations: Sequence[ObservationTerm] = (),
     ) -> None:
-        self.batch = make_batch(demonstration, config, 1, threads=1)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"render_mode must be 'rgb_array' or None, not {render_mode!r}")
+        self.render_mode = render_mode
+        self._painter: Painter | None = None
+        self.batch = make_batch(demonstration, config, 1, 1, extra_rewards, extra_observations)
         self.observation_space = observation_space(self.batch)
         self.action_space = action_space(self.batch)
+
+    def __str__(self) -> str:
+        """The environment's name, and the table of its terms."""
+        return f"{super().__str__()}\n{self.batch}"
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begin an episode; the seed says where, if that is anywhere."""
+        """Begin an episode; the seed decides where, if episodes begin anywhere."""
         super().reset(seed=seed)
         self.batch.reset(self.np_random)
         return self.batch.observations[0].copy(), {"frame": int(self.batch.frames[0])}
@@ -87,5 +140,25 @@ class SongEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
                 "frame": int(self.batch.frames[0]),
                 "f1": float(step.f1[0]),
                 "blow_ups": int(step.blow_ups[0]),
+                **{f"reward/{name}": float(value[0]) for name, value in step.rewards.items()},
             },
         )
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """The scene as it is, (408, 960, 3) uint8; None without a render mode.
+
+        Raises:
+            RenderUnavailable: there is no working OpenGL.
+        """
+        if self.render_mode is None:
+            return None
+        if self._painter is None:
+            self._painter = Painter(*RENDER_SIZE)
+        colours = key_colours(self.batch.pressed[0])
+        return np.ascontiguousarray(self._painter.paint(self.batch.qpos[0], colours))
+
+    def close(self) -> None:
+        """Free what rendering holds."""
+        if self._painter is not None:
+            self._painter.close()
+            self._painter = None

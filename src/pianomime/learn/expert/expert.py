@@ -6,16 +6,14 @@ from pathlib import Path
 
 from pianomime.errors import InputError
 from pianomime.keyboard import EXCERPT_SECONDS
-from pianomime.learn.envs.reference import load_song
+from pianomime.learn.envs.reference import load_demonstration
 from pianomime.learn.expert.config import ExpertConfig
-from pianomime.learn.runs.lock import run_lock
-from pianomime.learn.runs.run import RunFolder
-from pianomime.learn.runs.tell import Tell
-from pianomime.learn.runs.validation import check_config
+from pianomime.learn.expert.expert_run import ExpertRun
 from pianomime.plan.demonstration import DemonstrationPlanner
-from pianomime.players.player import Player
-from pianomime.track import Tracker
-from pianomime.track.replay import ReplayTracker
+from pianomime.players.player import PlannedPlayer, Player
+from pianomime.progress import Progress, no_progress
+from pianomime.track import ReplayTracker, Tracker
+from pianomime.world.layout import LAYOUT
 
 
 def train_expert(
@@ -25,19 +23,19 @@ def train_expert(
     start: float = 0.0,
     seconds: float = EXCERPT_SECONDS,
     threads: int = 0,
-    tell: Tell | None = None,
-) -> RunFolder:
-    """Train an expert of one song, or go on where a run of the same was.
+    progress: Progress = no_progress,
+) -> ExpertRun:
+    """Train an expert of one song, or resume a run of the same song and config.
 
     Args:
         song: a demonstration (.npz), a MIDI file or the name of a bundled song.
         out: folder of the run.
-        config: how.
+        config: how the expert is made.
         start: where the excerpt begins [s].
         seconds: its length at most [s].
         threads: of the physics and of PPO's networks; 0 for one on each core. PPO's curves are
             the same only with the same number.
-        tell: told how far it is.
+        progress: told the control steps spent and those in all.
 
     Returns:
         The run, with its best expert.
@@ -46,35 +44,34 @@ def train_expert(
         InputError: the song, the config or what is in the folder cannot be used.
         OSError: the folder cannot be written; what was there before stays.
     """
-    check_config(config)
-    loaded = load_song(song, start, seconds)
-    told = tell or (lambda done, total, remark: None)
-    with run_lock(out):
-        run = RunFolder.open(out, loaded, config, start, seconds)
+    demonstration = load_demonstration(song, start, seconds)
+    with ExpertRun.open(out, demonstration, config, start, seconds) as run:
         if run.finished:
             return run
         if config.method == "ppo":
             from pianomime.learn.expert.ppo import train_ppo
 
-            train_ppo(run, threads, told)
+            train_ppo(run, threads, progress)
         else:
-            from pianomime.learn.expert.trajectory_search import search
+            from pianomime.learn.expert.trajectory_search import search_trajectory
 
-            search(run, threads, told)
+            search_trajectory(run, threads, progress)
     return run
 
 
-def load_expert(path: Path) -> tuple[Player, RunFolder]:
+def load_expert(path: Path) -> tuple[Player, ExpertRun]:
     """The best expert of a run, as a player, and the run.
 
     Raises:
         InputError: there is no run, nothing was trained in it, or it is damaged.
     """
-    run = RunFolder.load(path)
-    return Player("expert", DemonstrationPlanner(run.song), expert_tracker(run)), run
+    run = ExpertRun.load(path)
+    excerpt = run.start, run.seconds
+    planner, tracker = DemonstrationPlanner(run.song), expert_tracker(run)
+    return PlannedPlayer("expert", planner, tracker, excerpt=excerpt), run
 
 
-def expert_tracker(run: RunFolder) -> Tracker:
+def expert_tracker(run: ExpertRun) -> Tracker:
     """The tracker of the best expert of a run.
 
     Raises:
@@ -85,6 +82,6 @@ def expert_tracker(run: RunFolder) -> Tracker:
         from pianomime.learn.expert.residual_policy import ResidualPolicyTracker
 
         return ResidualPolicyTracker.from_arrays(run.song, run.config, arrays)
-    if "ctrl" not in arrays or arrays["ctrl"].shape != (len(run.song.plan), 46):
+    if "ctrl" not in arrays or arrays["ctrl"].shape != (len(run.song.plan), LAYOUT.ctrl_size):
         raise InputError(f"{run.path}: the expert's controls do not fit its song")
     return ReplayTracker(arrays["ctrl"])

@@ -1,4 +1,4 @@
-"""Stable-Baselines3's PPO, and what is learned by it."""
+"""Stable-Baselines3's PPO with a number of threads, and the actor that it trains."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pianomime.learn.runs.torch_threads import torch_threads
 
 
 class Ppo(PPO):
-    """PPO that leaves the cores to whoever needs them.
+    """PPO whose networks use several threads in updates and one while it collects rollouts.
 
     Attributes:
         threads: of the networks in updates.
@@ -20,14 +20,14 @@ class Ppo(PPO):
     threads: int
 
     def collect_rollouts(self, *arguments: Any, **named: Any) -> bool:
-        """Play. Threads of networks that wait for the next pass would keep cores from physics."""
+        """Collect rollouts. Idle threads of the networks would take cores from the physics."""
         with torch_threads(1):
             return super().collect_rollouts(*arguments, **named)
 
     def train(self) -> None:
-        """Learn, with the products of matrices in bfloat16 (sums in float32) where that is faster.
+        """Update, with matrix products in bfloat16 (sums in float32) where that is faster.
 
-        They are most of an update.
+        They take most of the time of an update.
         """
         precision = torch.get_float32_matmul_precision()
         torch.set_float32_matmul_precision("medium")
@@ -39,5 +39,5 @@ class Ppo(PPO):
 
 
 def actor_network(model: Any) -> torch.nn.Sequential:
-    """The actor alone, from observations to mean actions."""
+    """The actor of a PPO model, from observations to mean actions."""
     return torch.nn.Sequential(*model.policy.mlp_extractor.policy_net, model.policy.action_net)

@@ -1,9 +1,9 @@
 """Trajectory search: controls of one song, improved in simulation pass after pass.
 
-Each pass plays the song from beginning to end as `PredictiveSamplingTracker` does: a little way
-ahead in a copy of the world, with variations where keys go wrong. The first pass starts from the
-base controller and each later one from the best controls so far, so that what is right stays. The
-goal is all keys of the score, those that the plan leaves out for lack of a finger included.
+Each pass plays the song from beginning to end with predictive sampling: a few frames ahead in a
+copy of the world, with variations where keys go wrong. The first pass starts from the base
+controller and each later one from the best controls so far, so that what is right stays. The goal
+is all keys of the score, including those that the plan leaves out for lack of a finger.
 """
 
 from __future__ import annotations
@@ -14,26 +14,31 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.learn.envs.batch import prior_tracker
+from pianomime.learn.envs.batch import base_tracker
 from pianomime.learn.expert.config import TrajectorySearchConfig
 from pianomime.learn.runs.log import RunLog
-from pianomime.learn.runs.run import Evaluation, RunFolder
-from pianomime.learn.runs.tell import Tell
-from pianomime.plan.demonstration import DemonstrationPlanner
+from pianomime.learn.expert.expert_run import Evaluation, ExpertRun
 from pianomime.players.performance import Performance
 from pianomime.players.player import Player
-from pianomime.track import PredictiveSamplingConfig, PredictiveSamplingTracker, Tracker
-from pianomime.track.replay import ReplayTracker
+from pianomime.music import Score
+from pianomime.progress import Progress
+from pianomime.track import (
+    PredictiveSamplingConfig,
+    PredictiveSamplingTracker,
+    ReplayTracker,
+    Tracker,
+)
+from pianomime.track.predictive_sampling import PredictiveSamplingController
 
 
-def search(run: RunFolder, threads: int, tell: Tell) -> None:
-    """Search until the run's steps are spent; go on after the last pass that was finished.
+def search_trajectory(run: ExpertRun, threads: int, progress: Progress) -> None:
+    """Search until the run's steps are spent; resume after the last pass that was finished.
 
     Args:
         run: its folder.
         threads: how many variations step at the same time; 0 for one on each core. It changes
             nothing but the time that it takes.
-        tell: told how far it is.
+        progress: told the control steps spent and those in all.
 
     Raises:
         InputError: the checkpoint is damaged.
@@ -41,64 +46,94 @@ def search(run: RunFolder, threads: int, tell: Tell) -> None:
     """
     state = run.state()
     curve = run.curve()
-    ctrl = None if state is None else state[0]["ctrl"]
+    ctrl = None if state is None else state.arrays["ctrl"]
     steps = run.steps_done
     with closing(RunLog(run.tensorboard, steps + 1)) as log:
-        while steps < run.config.steps:
-            tracker = _pass(run, ctrl, len(curve), threads)
-            played = _play(run, tracker, steps, curve, tell)
-            steps += tracker.steps + len(played)
+        while steps < run.config.total_steps:
+            player = _PassPlayer(run, ctrl, len(curve), threads)
+            played = _play(run, player, steps, curve, progress)
+            steps += player.steps + len(played)
             made = Evaluation(steps, **_scores(played))
             if made.f1 > max((one.f1 for one in curve), default=-1.0):
                 ctrl = played.ctrl
                 run.keep_best({"ctrl": ctrl}, made)
             assert ctrl is not None
             curve.append(made)
-            run.checkpoint({"ctrl": ctrl}, {}, curve)
-            log.add(steps, {f"song/{name}": figure for name, figure in _scores(played).items()})
+            run.checkpoint({"ctrl": ctrl}, steps, curve)
+            log.add(steps, {f"eval/{name}": value for name, value in _scores(played).items()})
 
 
 def pass_config(
     settings: TrajectorySearchConfig, number: int, seed: int
 ) -> PredictiveSamplingConfig:
-    """Settings of a pass: the usual variations, larger and smaller ones by turns."""
-    usual = PredictiveSamplingConfig()
+    """Settings of a pass.
+
+    Args:
+        settings: of the search.
+        number: of the pass, from 0; the size of the variations depends on it.
+        seed: of the run.
+    """
+    default = PredictiveSamplingConfig()
     size = settings.sizes[number % len(settings.sizes)]
-    draws = np.random.SeedSequence([seed, number]).generate_state(1)
+    seeds = np.random.SeedSequence([seed, number]).generate_state(1)
     return replace(
-        usual,
+        default,
         variations=settings.variations,
         rounds=settings.rounds,
         commit=settings.commit,
         ahead=settings.ahead,
-        joint=usual.joint * size,
-        wrist=usual.wrist * size,
-        slide=usual.slide * size,
-        seed=int(draws[0]),
+        joint=default.joint * size,
+        wrist=default.wrist * size,
+        slide=default.slide * size,
+        seed=int(seeds[0]),
     )
 
 
-def _pass(
-    run: RunFolder, ctrl: NDArray[np.float64] | None, number: int, threads: int
-) -> PredictiveSamplingTracker:
-    inner: Tracker = prior_tracker(run.config.env) if ctrl is None else ReplayTracker(ctrl)
-    config = pass_config(run.config.search, number, run.config.seed)
-    return PredictiveSamplingTracker(inner, config, run.song.score.roll(), threads)
+class _PassPlayer(Player):
+    """Plays one pass over the song of a run, which it improves as it goes.
+
+    Args:
+        run: whose song to play.
+        ctrl: (T, 46) controls to improve [rad, m]; those of the base controller if None.
+        number: of the pass, from 0.
+        threads: how many variations step at the same time; 0 for one on each core.
+    """
+
+    name = "search"
+
+    def __init__(
+        self, run: ExpertRun, ctrl: NDArray[np.float64] | None, number: int, threads: int
+    ) -> None:
+        inner: Tracker = base_tracker(run.config.env) if ctrl is None else ReplayTracker(ctrl)
+        config = pass_config(run.config.search, number, run.config.seed)
+        self._tracker = PredictiveSamplingTracker(inner, config, run.song.score.roll(), threads)
+        self._plan = run.song.plan
+        self._controller: PredictiveSamplingController | None = None
+
+    @property
+    def steps(self) -> int:
+        """Control steps that were simulated to look ahead so far."""
+        return 0 if self._controller is None else self._controller.steps
+
+    def start(self, score: Score) -> PredictiveSamplingController:
+        """As `Player.start`; the score is that of the run."""
+        self._controller = self._tracker.start(self._plan)
+        return self._controller
 
 
 def _play(
-    run: RunFolder,
-    tracker: PredictiveSamplingTracker,
+    run: ExpertRun,
+    player: _PassPlayer,
     steps: int,
     curve: list[Evaluation],
-    tell: Tell,
+    progress: Progress,
 ) -> Performance:
     best = max((one.f1 for one in curve), default=0.0)
     remark = f"pass {len(curve) + 1}, F1 {best:.3f}"
-    player = Player("search", DemonstrationPlanner(run.song), tracker)
 
-    def passed_on(stage: str, done: int, total: int) -> None:
-        tell(min(steps + tracker.steps + done, run.config.steps), run.config.steps, remark)
+    def passed_on(phase: str, done: int, total: int, _: str = "") -> None:
+        spent = min(steps + player.steps + done, run.config.total_steps)
+        progress("training", spent, run.config.total_steps, remark)
 
     return player.play(run.song.score, passed_on)
 

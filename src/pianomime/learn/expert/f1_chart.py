@@ -1,4 +1,4 @@
-"""Figure 8 of the paper: the F1 of all experts, sorted."""
+"""Bar chart of the F1 of many experts, sorted (paper, figure 8)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pianomime.files import atomic
-from pianomime.learn.expert.expert_worker import Row
+from pianomime.workers import Row
 
 
-def draw_experts(rows: list[Row], path: Path) -> None:
-    """Draw a picture of the experts that did not fail.
+def draw_f1_chart(rows: list[Row], path: Path) -> None:
+    """Draw the F1 of all experts that did not fail, the best first.
 
     Args:
-        rows: a row a song.
-        path: where to, a .png.
+        rows: one for each song, with `f1` or `error`.
+        path: of the picture (.png), which appears only when complete.
     """
     f1 = sorted((row["f1"] for row in rows if "error" not in row), reverse=True)
     figure = Figure(figsize=(8, 3), layout="constrained")
