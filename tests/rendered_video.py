@@ -13,7 +13,7 @@ from pianomime.video.keyboard.plane import Plane, fit_plane
 from pianomime.world.hand import Hand
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres, key_half_sizes
-from pianomime.world.render import write_video
+from pianomime.world.render import View, write_video
 from pianomime.world.scene_look import key_colours
 
 SIZE = (1280, 544)
@@ -27,7 +27,12 @@ def write(path: Path, performance: Performance, light_up: bool) -> None:
     """Film a performance, with keys that light up or only go down."""
     lit = performance.pressed if light_up else np.zeros_like(performance.pressed)
     write_video(
-        path, performance.qpos, performance.pressed, None, colours=key_colours(lit), camera="top"
+        path,
+        performance.qpos,
+        performance.pressed,
+        None,
+        colours=key_colours(lit),
+        view=View(camera="top"),
     )
 
 

@@ -1,4 +1,4 @@
-"""Reading and writing .npz files."""
+"""Reading and writing .npz files, with errors in one line for files of another kind."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from pianomime.errors import InputError
 _Made = TypeVar("_Made")
 
 _BLOCK = 1 << 20
-"""Bytes that are compressed at once."""
+"""Bytes that are compressed at a time."""
 
 
 def read_arrays(path: str | os.PathLike[str], kind: str) -> dict[str, NDArray[Any]]:
-    """The arrays in a file.
+    """Read all arrays of a file.
 
     Args:
         path: the .npz file.
         kind: what it should be, such as "a performance".
 
     Raises:
-        OSError: there is no such file, or it cannot be read.
-        InputError: it holds no arrays, or is damaged.
+        OSError: the file does not exist or cannot be read.
+        InputError: it is not an .npz file, or damaged.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -35,8 +35,8 @@ def read_arrays(path: str | os.PathLike[str], kind: str) -> dict[str, NDArray[An
     except (FileNotFoundError, IsADirectoryError, PermissionError):
         raise
     except Exception as error:
-        # On damaged data zipfile, zlib and numpy raise all kinds of errors, and what they say,
-        # such as to allow pickles, is no advice for a user.
+        # On damaged data zipfile, zlib and numpy raise many kinds of errors, with messages such as
+        # the advice to allow pickles, which do not help a user.
         raise InputError(f"{path}: not {kind}, or a damaged one") from error
 
 
@@ -46,38 +46,38 @@ def read_archive(
     version: tuple[str, int],
     make: Callable[[dict[str, NDArray[Any]]], _Made],
 ) -> _Made:
-    """What a file of ours holds.
+    """Read an object from a file with a version number.
 
     Args:
         path: the .npz file.
         kind: what it should be, such as "a performance".
-        version: name of the array that tells the version, and the version that we know.
-        make: makes it from the arrays.
+        version: name of the array with the version, and the version that can be read.
+        make: makes the object from the arrays.
 
     Raises:
-        OSError: there is no such file, or it cannot be read.
-        InputError: it is not of the kind, or of a version that we do not know.
+        OSError: the file does not exist or cannot be read.
+        InputError: it is of another kind, or of another version.
     """
     name, known = version
     arrays = read_arrays(path, kind)
     try:
         found = int(arrays[name])
         made = make(arrays) if found == known else None
-    except Exception as error:  # arrays of another kind make all kinds of errors
+    except Exception as error:  # arrays of another kind raise many kinds of errors
         raise InputError(f"{path}: not {kind}, or a damaged one") from error
     if made is None:
         raise InputError(
-            f"{path}: {kind} of version {found}; this program reads {known}: make it anew"
+            f"{path}: {kind} of version {found}; this program reads version {known}: make it anew"
         )
     return made
 
 
 def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write arrays to one compressed file; in small blocks, where numpy takes some 40 MiB.
+    """Write arrays to one compressed file, in small blocks: `numpy.savez` takes 40 MiB more.
 
     Args:
-        path: where to.
-        arrays: by name; of numbers or texts.
+        path: the .npz file.
+        arrays: arrays of numbers or texts, by name.
 
     Raises:
         OSError: the file cannot be written.

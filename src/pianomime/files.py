@@ -1,7 +1,8 @@
-"""Files, and folders of files, that appear whole or not at all."""
+"""Atomic writing: files, and folders of files, that appear completely or not at all."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shutil
@@ -17,9 +18,9 @@ from pianomime.errors import InputError
 def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Write a file in one step, so that a reader never finds half of it.
 
-    Yields a temporary path in the same folder, with the same suffix (writers that choose a format
-    by suffix, and those that add one they miss, work as they are). Leaving the block puts the file
-    in place; any exception, Ctrl-C too, removes it and leaves what was at `path` untouched.
+    Yields a temporary path in the same folder, with the same suffix, because some writers choose a
+    format by it. Leaving the block moves the file into place; any exception, Ctrl-C too, removes
+    it and leaves what was at `path` untouched.
 
     Args:
         path: where the file should end up; its folder must exist.
@@ -28,8 +29,8 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
         FileNotFoundError: the folder does not exist, or the block wrote nothing.
     """
     target = Path(path)
-    # Our own empty folder rather than a name that is only likely to be free: the writer creates the
-    # file itself, with the permissions that the user's umask gives, and two writers cannot meet.
+    # A temporary folder, not a temporary file name: the writer creates the file itself, with the
+    # permissions of the user's umask, and two writers cannot choose the same name.
     with tempfile.TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
         temporary = Path(folder, target.name)
         yield temporary
@@ -37,11 +38,11 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def leftovers(folder: Path, names: Iterable[str]) -> list[str]:
-    """Names of the folders in which `atomic` was writing files when its process was killed.
+    """Names of temporary folders that `atomic` left when its process was killed.
 
     Args:
         folder: where the files should have ended up.
-        names: of the files.
+        names: names of the files.
     """
     ours = "|".join(re.escape(Path(name).stem) for name in names)
     form = re.compile(rf"\.({ours})-\w+")
@@ -49,9 +50,26 @@ def leftovers(folder: Path, names: Iterable[str]) -> list[str]:
 
 
 def sweep(folder: Path, names: Iterable[str]) -> None:
-    """Remove `leftovers`; nobody may be writing these files."""
+    """Remove the temporary folders that `leftovers` finds.
+
+    Args:
+        folder: where the files should have ended up.
+        names: names of the files, which nobody may be writing now.
+    """
     for name in leftovers(folder, names):
         shutil.rmtree(folder / name, ignore_errors=True)
+
+
+def files_digest(files: Iterable[Path]) -> str:
+    """SHA-256 of the contents of files, one after the other, in hexadecimal digits.
+
+    Raises:
+        OSError: one cannot be read.
+    """
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
 
 
 @contextmanager
@@ -59,23 +77,24 @@ def staged(out: Path, ours: Collection[str]) -> Iterator[Path]:
     """Collect files in a temporary folder, then put them in place together.
 
     Yields the temporary folder. Any exception in the block, Ctrl-C too, removes its files and
-    leaves `out` as it was. Leaving the block moves them into `out`: in one step if there is no
-    `out` yet, else one by one, so that what interrupts just that leaves some of them in place.
+    leaves `out` as it was. Leaving the block moves them into `out`: in one step if `out` does not
+    exist, else one by one, so that an interruption during the move leaves some of them in place.
 
     Args:
-        out: where the files should end up; made, with its parents, if need be.
-        ours: names that belong to us: those in `out` that were not written this time are from
-            an earlier run and are removed. No other file in `out` is touched.
+        out: where the files should end up; created, with its parents, if it does not exist.
+        ours: all names that a caller may write: files of these names in `out` that were not
+            written this time are from an earlier run and are removed. No other file in `out` is
+            touched.
 
     Raises:
-        InputError: `out` is no folder, or cannot be written.
+        InputError: `out` is not a folder, or cannot be written.
     """
     try:
         mine = _folder_beside(out)
     except OSError as error:
         raise _cannot_be_written(out, error) from error
     try:
-        # Not `mine` itself, which nobody else may read: this one has the permissions of the umask.
+        # Not `mine` itself, which only the user may read: this one has the umask's permissions.
         temporary = mine / "out"
         temporary.mkdir()
         yield temporary
@@ -88,7 +107,7 @@ def staged(out: Path, ours: Collection[str]) -> Iterator[Path]:
 
 
 def _folder_beside(out: Path) -> Path:
-    """A new folder on the file system of `out`, which may be a mount of its own."""
+    """A new folder on the same file system as `out`, which may be a mount of its own."""
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; a folder is needed")
     home = out.absolute()

@@ -1,4 +1,4 @@
-"""The piano's keyboard and the clock of everything that is played on it."""
+"""Constants of the keyboard and of time: keys, pitches, names, and the frame rate."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 KEYS = 88
 """Number of keys; key 0 is A0, key 87 is C8."""
+
+KEYS_PER_OCTAVE = 12
+"""Black and white keys of an octave."""
 
 LOWEST_PITCH = 21
 """MIDI pitch of key 0."""
@@ -18,14 +21,16 @@ FRAME_SECONDS = 1.0 / FRAME_RATE
 """[s] Length of a frame."""
 
 EXCERPT_SECONDS = 30.0
-"""[s] Length of an excerpt unless told otherwise: the longest clip of the paper's protocol."""
+"""[s] Default length of an excerpt: the longest clip of the paper's protocol."""
 
 NO_KEY = -1
-"""Stands for no key in arrays of keys."""
+"""Marks the absence of a key in arrays of keys."""
 
 _NAMES = ("A", "A♯", "B", "C", "C♯", "D", "D♯", "E", "F", "F♯", "G", "G♯")
 
-BLACK: NDArray[np.bool_] = np.array([len(_NAMES[key % 12]) == 2 for key in range(KEYS)])
+BLACK: NDArray[np.bool_] = np.array(
+    [len(_NAMES[key % KEYS_PER_OCTAVE]) == 2 for key in range(KEYS)]
+)
 """(88,) bool: the black keys; read-only."""
 BLACK.setflags(write=False)
 
@@ -36,4 +41,5 @@ def key_name(key: int) -> str:
     Args:
         key: 0..87.
     """
-    return f"{_NAMES[key % 12]}{(key + LOWEST_PITCH) // 12 - 1}"
+    octave = (key + LOWEST_PITCH) // KEYS_PER_OCTAVE - 1
+    return f"{_NAMES[key % KEYS_PER_OCTAVE]}{octave}"

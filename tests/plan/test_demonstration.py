@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import made_up_video as made_up
+from pianomime import load_player
 from pianomime.errors import InputError
 from pianomime.plan import ZeroShotPlanner
 from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner, on_grid
-from pianomime.players.player import DEMONSTRATION_PLAYERS, Player
+from pianomime.players.player import DEMONSTRATION_PLAYERS
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +95,7 @@ def test_the_planner_knows_one_score(shown):
 
 @pytest.mark.parametrize("name", DEMONSTRATION_PLAYERS)
 def test_players_play_it(shown, name):
-    performance = Player.from_demonstration(shown, name).play(shown.score)
+    performance = load_player(name, demonstration=shown).play(shown.score)
     assert performance.player == name
     assert performance.plan is shown.plan
     assert performance.metrics()["f1"] > 0.4
@@ -102,4 +103,4 @@ def test_players_play_it(shown, name):
 
 def test_players_of_demonstrations_do_not_play_midi():
     with pytest.raises(InputError, match="demonstrations"):
-        Player.from_name("demonstration")
+        load_player("demonstration")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pianomime import load_player
 from pianomime.music import Score
-from pianomime.players.player import Player
 from pianomime.songs.find import find_song
 
 
@@ -13,4 +13,4 @@ from pianomime.songs.find import find_song
 def song_controls() -> NDArray[np.float64]:
     """(T, 46) controls with which the hands really play: 8 s of a bundled song."""
     score = Score.from_midi(find_song("bach-prelude-c")).clip(0.0, 8.0)
-    return Player.from_name("zero-shot").play(score).ctrl
+    return load_player("zero-shot").play(score).ctrl

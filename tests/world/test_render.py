@@ -11,7 +11,7 @@ from pianomime.keyboard import KEYS
 from pianomime.world import render
 from pianomime.world.model import build_spec
 from pianomime.world.parameters import key_travel
-from pianomime.world.render import RenderUnavailable, render_frame, write_video
+from pianomime.world.render import RenderUnavailable, View, render_frame, write_video
 from pianomime.world.scene_look import CAMERAS, dress
 
 POSITIONS = 142
@@ -108,12 +108,18 @@ def test_a_film_has_every_frame_and_its_sound(tmp_path: Path) -> None:
     # Longer than the film on purpose: sound rings on after the last frame.
     audio = np.zeros((2 * rate, 2), np.float32)
     audio[rate // 2 :] = 0.5 * np.sin(np.arange(3 * rate // 2) * 0.2)[:, None]
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[object, ...]] = []
     path = tmp_path / "film.mp4"
     write_video(
-        path, qpos, pressed, audio, rate, size=SMALL, progress=lambda *done: told.append(done)
+        path,
+        qpos,
+        pressed,
+        audio,
+        rate,
+        view=View(size=SMALL),
+        progress=lambda *done: reported.append(done),
     )
-    assert told == [(frame + 1, frames) for frame in range(frames)]
+    assert reported == [("rendering", frame + 1, frames) for frame in range(frames)]
     with av.open(str(path)) as film:
         assert film.streams.video[0].codec_context.name == "h264"
         assert film.streams.audio[0].codec_context.name == "aac"
@@ -135,7 +141,7 @@ def test_a_film_may_be_silent_and_have_its_own_colours(tmp_path: Path) -> None:
     qpos, pressed = performance(4)
     colours = np.full((4, KEYS, 3), (1.0, 0.0, 0.0), np.float32)
     path = tmp_path / "film.mp4"
-    write_video(path, qpos, pressed, None, colours=colours, size=SMALL)
+    write_video(path, qpos, pressed, None, colours=colours, view=View(size=SMALL))
     with av.open(str(path)) as film:
         assert not film.streams.audio
         picture = next(film.decode(video=0)).to_ndarray(format="rgb24").astype(int)
@@ -144,12 +150,14 @@ def test_a_film_may_be_silent_and_have_its_own_colours(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("opengl")
 def test_an_interrupted_film_leaves_nothing(tmp_path: Path) -> None:
-    def interrupt(done: int, total: int) -> None:
+    def interrupt(phase: str, done: int, total: int, remark: str = "") -> None:
         raise KeyboardInterrupt
 
     qpos, pressed = performance(5)
     with pytest.raises(KeyboardInterrupt):
-        write_video(tmp_path / "film.mp4", qpos, pressed, None, size=SMALL, progress=interrupt)
+        write_video(
+            tmp_path / "film.mp4", qpos, pressed, None, view=View(size=SMALL), progress=interrupt
+        )
     assert not list(tmp_path.iterdir())
 
 
@@ -202,7 +210,7 @@ def test_shapes_that_do_not_fit_are_refused(
             np.zeros(qpos),
             np.zeros(pressed, bool),
             None if audio is None else np.zeros(audio, np.float32),
-            size=size,
+            view=View(size=size),
         )
 
 

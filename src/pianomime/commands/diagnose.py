@@ -19,10 +19,10 @@ _LONGEST = 10
 
 @dataclass(frozen=True)
 class Diagnose:
-    """Say why notes of a performance were missed or wrong: by which cause, by which finger.
+    """Find out why keys were missed or wrong in a performance: the cause, and the finger.
 
-    OUT then also holds the same as a picture (diagnosis.png) and every single fault
-    (diagnosis.json). Several performances are added up.
+    Prints the causes, and writes a picture (diagnosis.png) and all faults (diagnosis.json) to OUT.
+    Several performances are summed.
 
     Examples:
       pianomime diagnose out/fur-elise/performance.npz
@@ -33,15 +33,15 @@ class Diagnose:
     performances: Annotated[
         tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="PERFORMANCE.npz...")
     ]
-    """What `pianomime play` saved as performance.npz."""
+    """Files performance.npz that `pianomime play` has written."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
-    """Folder for the diagnosis; that of the first performance if not given."""
+    """Folder for the diagnosis; by default that of the first performance."""
 
     def run(self) -> None:
-        """Explain, print and write.
+        """Diagnose, print and write.
 
         Raises:
-            InputError: there is no performance, or one without a plan to compare with.
+            InputError: no performance is given, or one has no fingertip plan.
             OSError: a file cannot be read or written.
         """
         from rich.console import Console
@@ -64,7 +64,7 @@ class Diagnose:
         console.print(_causes(diagnoses))
         if any(diagnosis.faults for diagnosis in diagnoses):
             console.print(_longest(diagnoses))
-        print(f"look: {out / 'diagnosis.png'}")
+        print(f"picture: {out / 'diagnosis.png'}")
 
 
 def _causes(diagnoses: Sequence[Diagnosis]) -> Table:
@@ -76,7 +76,7 @@ def _causes(diagnoses: Sequence[Diagnosis]) -> Table:
     table = Table(
         title=songs,
         title_style="bold",
-        caption="frames of 0.05 s; their share of those in which keys should be down",
+        caption="frames: one key for 0.05 s; share: of all frames in which keys should be down",
     )
     table.add_column("cause", no_wrap=True)
     table.add_column("")

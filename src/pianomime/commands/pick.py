@@ -11,10 +11,10 @@ import tyro
 
 @dataclass(frozen=True)
 class Pick:
-    """Show where the keyboard is, by clicking points of it in a web page on this machine.
+    """Mark the keyboard in a video by clicking points of it on a web page of this machine.
 
-    For videos in which `pianomime retarget` does not find it by itself. Four points will do; eight
-    are better.
+    For videos in which `pianomime retarget` does not find the keyboard. Four points are enough;
+    eight are better.
 
     Examples:
       pianomime pick VIDEO.mp4 -o POINTS.json
@@ -22,11 +22,11 @@ class Pick:
     """
 
     video: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="VIDEO")]
-    """Any video in which a keyboard is seen from above."""
+    """A video of a keyboard from above."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="POINTS.json")] = None
-    """The points; out/VIDEO-points.json if not given."""
+    """File for the points; by default out/VIDEO-points.json."""
     port: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Of the web page; any free one if 0."""
+    """Port of the web page; 0 for any free one."""
     browser: bool = True
     """Open the page in a browser."""
 
@@ -34,7 +34,7 @@ class Pick:
         """Serve the page until the points are saved.
 
         Raises:
-            InputError: not a video, or OUT or the port is not what it should be.
+            InputError: the video cannot be read, OUT is not a .json file, or the port is in use.
             OSError: a file cannot be read or written.
         """
         import webbrowser
@@ -45,12 +45,12 @@ class Pick:
 
         out = self.out or Path("out", self.video.stem + "-points.json")
         if out.suffix != ".json":
-            raise InputError(f"{out}: points are a file that ends in .json")
+            raise InputError(f"{out}: the name of a file of points must end in .json")
         with PickPage(Film(self.video), out, self.port) as page:
             out.parent.mkdir(parents=True, exist_ok=True)
-            print(f"click the points here: {page.url} (Ctrl-C to give up)", flush=True)
+            print(f"click the points on {page.url} (Ctrl-C to cancel)", flush=True)
             if self.browser:
                 webbrowser.open(page.url)
-            told = page.wait()
-        print(f"saved {out}: {told}")
-        print(f"go on with: pianomime retarget {self.video} --points {out}")
+            saved = page.wait()
+        print(f"saved {out}: {saved}")
+        print(f"next: pianomime retarget {self.video} --points {out}")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Songs:
     """List the bundled songs.
 
-    They can be played by name, or by a part of it.
+    Each can be played by its name or a part of it.
 
     Examples:
       pianomime songs
@@ -17,7 +17,7 @@ class Songs:
     """
 
     def run(self) -> None:
-        """Print one name a line."""
+        """Print one name per line."""
         from pianomime import songs
 
         print("\n".join(songs.names()))

@@ -1,4 +1,4 @@
-"""Why notes went wrong: every missed and wrong note of a performance with its cause."""
+"""Diagnosis of a performance: the cause of every missed and every wrong key."""
 
 from __future__ import annotations
 
@@ -14,27 +14,31 @@ from numpy.typing import NDArray
 from pianomime.keyboard import NO_KEY
 from pianomime.players.performance import Performance
 from pianomime.world.hand import Hand
+from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres, key_half_sizes
 
 NOBODY = -1
-"""Stands for no hand, no finger or no note."""
+"""Marks that there is no hand, no finger or no note."""
 
-# A finger this much further from a key's middle than the key's edge still presses it [m].
 _OVERLAP = 0.003
-# A key less than this share of the way down has not been touched.
+"""[m] A finger whose centre is this far beyond the edge of a key still presses it."""
 _TOUCHED = 0.05
-# A fingertip whose site is further than this from a key's box at rest does not press it [m]: its
-# flesh is 8.5 mm thick below the site and at most 12 mm around it.
+"""A key that is down by a smaller share of its way has not been touched."""
 _TOUCH = 0.013
-# A key that goes down longer before its note than this was not meant for it [frames].
+"""[m] A fingertip whose site is further from the box of a key at rest does not press it: the
+fingertip reaches 8.5 mm below its site and at most 12 mm around it."""
 _MOST_EARLY = 4
-# Frames after the physics broke that are put down to it: the hands take so long to come back.
+"""Frames before a note in which its key may go down and still be meant for it."""
 _AFTERMATH = 10
+"""Frames after unstable physics whose faults are blamed on it: the hands need them to return."""
 
 
 class Cause(StrEnum):
-    """Why a key was up when it should have been down, or down when it should have been up."""
+    """Why a key was up when it should have been down, or down when it should have been up.
+
+    The values are the labels in tables and pictures.
+    """
 
     BROKEN = "physics broke"
     NOT_PLANNED = "not planned"
@@ -53,16 +57,17 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True)
 class Fault:
-    """A run of frames in which one key was wrong for one cause.
+    """A run of frames in which one key was missed or wrong for one cause.
 
     Attributes:
-        missed: True for a key that should have been down, False for one that should not.
-        key: 0..87.
-        first, frames: when, and for how long [0.05 s frames].
-        cause: why.
-        hand, finger: 0 left or 1 right, and 0 thumb .. 4 little, of the finger to blame; -1 for
-            none.
-        note: the note of the score that was missed; -1 for a wrong key.
+        missed: True for a key that should have been down, False for one that should have been up.
+        key: the key, 0..87.
+        first: first frame.
+        frames: number of frames.
+        cause: the cause.
+        hand: hand of the finger to blame, 0 left, 1 right, -1 for none.
+        finger: finger to blame, 0 thumb .. 4 little, -1 for none.
+        note: index of the note of the score that was missed; -1 for a wrong key.
     """
 
     missed: bool
@@ -77,13 +82,15 @@ class Fault:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Everything that went wrong in one performance.
+    """All faults of one performance.
+
+    A key-frame is one key in one frame, a cell of the piano roll.
 
     Attributes:
         song: title of the score.
-        player: who played.
-        wanted: key-frames that the score asks for: cells of its roll.
-        faults: in order of time; their frames add up to the cells that were missed and wrong.
+        player: name of the player.
+        wanted: number of key-frames in which a key should be down.
+        faults: in order of time; their frames add up to all key-frames missed and wrong.
     """
 
     song: str
@@ -94,15 +101,16 @@ class Diagnosis:
 
 @dataclass(frozen=True)
 class Total:
-    """What one cause cost.
+    """Sum of the faults of one cause.
 
     Attributes:
-        missed: whether keys were up that should have been down, or the other way round.
-        cause: why.
-        frames: key-frames lost.
-        share: of the key-frames wanted.
-        notes: notes of the score that were missed in part or whole, or wrong presses.
-        hand, finger: who is to blame for most of it, as in Fault.
+        missed: True for keys that should have been down, False for keys that should have been up.
+        cause: the cause.
+        frames: number of key-frames missed or wrong.
+        share: `frames` as a share of the key-frames wanted.
+        notes: number of notes missed in part or whole, or of wrong presses.
+        hand: hand of the finger to blame for most of these frames, as in `Fault`.
+        finger: finger to blame for most of these frames, as in `Fault`.
     """
 
     missed: bool
@@ -115,13 +123,16 @@ class Total:
 
 
 def diagnose(performance: Performance) -> Diagnosis:
-    """Find the cause of every fault of a performance.
+    """Find the cause of every missed and every wrong key of a performance.
+
+    Plan, fingertips and keys of each frame are compared in a fixed order of rules; the first cause
+    that applies is reported.
 
     Args:
-        performance: one with a fingertip plan.
+        performance: a performance with a fingertip plan.
 
     Raises:
-        ValueError: the performance has no plan to compare with.
+        ValueError: the performance has no plan.
     """
     scene = _Scene.of(performance)
     faults = []
@@ -134,7 +145,7 @@ def diagnose(performance: Performance) -> Diagnosis:
                 (frame, (*judge(frame, key), int(scene.note[frame, key])))
                 for frame in np.flatnonzero(cells[:, key]).tolist()
             ]
-            # In an unbroken run, the frame less its place in the list stays the same.
+            # In an unbroken run, frame minus place in the list is constant.
             places = groupby(enumerate(judged), lambda item: (item[1][0] - item[0], item[1][1]))
             for (_, (cause, hand, finger, note)), group in places:
                 frames = [frame for _, (frame, _) in group]
@@ -145,7 +156,11 @@ def diagnose(performance: Performance) -> Diagnosis:
 
 
 def totals(diagnoses: Iterable[Diagnosis]) -> list[Total]:
-    """What each cause cost over all performances together, the costliest first."""
+    """Sum the faults of all performances by cause, the most frames first.
+
+    Args:
+        diagnoses: of any number of performances.
+    """
     frames: Counter[tuple[bool, Cause]] = Counter()
     fingers: dict[tuple[bool, Cause], Counter[tuple[int, int]]] = {}
     notes: dict[tuple[bool, Cause], set[tuple[int, int, int]]] = {}
@@ -156,7 +171,7 @@ def totals(diagnoses: Iterable[Diagnosis]) -> list[Total]:
             kind = fault.missed, fault.cause
             frames[kind] += fault.frames
             fingers.setdefault(kind, Counter())[fault.hand, fault.finger] += fault.frames
-            # A missed note counts once, however often it was lost; a wrong press is its own.
+            # A note that is missed several times counts once; every wrong press counts.
             note = (fault.note, NOBODY) if fault.missed else (NOBODY, place)
             notes.setdefault(kind, set()).add((song, *note))
     return [
@@ -173,7 +188,11 @@ def totals(diagnoses: Iterable[Diagnosis]) -> list[Total]:
 
 
 def frames_by_cause(diagnosis: Diagnosis) -> dict[str, int | dict[str, int]]:
-    """The key-frames `wanted`, and those `missed` and `wrong` by cause, the costliest first."""
+    """Key-frames `wanted`, and those `missed` and `wrong` by cause, the most first.
+
+    Args:
+        diagnosis: of one performance.
+    """
     sums = totals([diagnosis])
     return {
         "wanted": diagnosis.wanted,
@@ -184,17 +203,17 @@ def frames_by_cause(diagnosis: Diagnosis) -> dict[str, int | dict[str, int]]:
 
 @dataclass(frozen=True, eq=False)
 class _Scene:
-    """What is known of each frame.
+    """Plan, fingertips and keys of each of T frames.
 
     Attributes:
-        wanted: (T, 88) bool.
-        pressed: (T, 88) bool.
-        key_state: (T, 88) 0..1.
-        note: (T, 88) the note of the score that wants a key, -1 for none.
-        finger_key: (T, 2, 5) the key each finger was to press.
-        planned: (T, 2, 5) [m] where along the keyboard each fingertip was to be.
-        tips: (T, 2, 5, 3) [m] where the fingertips were at the end of each frame.
-        broken: (T,) bool, in the aftermath of broken physics.
+        wanted: (T, 88) bool, keys that should be down.
+        pressed: (T, 88) bool, keys that are down.
+        key_state: (T, 88) how far each key is down, 0..1.
+        note: (T, 88) index of the note of the score that holds a key down, -1 for none.
+        finger_key: (T, 2, 5) key that each finger should press.
+        planned: (T, 2, 5) target of each fingertip along the keyboard, world y [m].
+        tips: (T, 2, 5, 3) fingertips at the end of each frame, world frame [m].
+        broken: (T,) bool, frames shortly after unstable physics.
     """
 
     wanted: NDArray[np.bool_]
@@ -211,7 +230,7 @@ class _Scene:
         plan, score = performance.plan, performance.score
         if plan is None:
             raise ValueError("a performance without a fingertip plan cannot be diagnosed")
-        tips = np.empty((len(performance), 2, 5, 3))
+        tips = np.empty((len(performance), 2, FINGER_COUNT, 3))
         for index, side in enumerate(SIDES):
             hand = Hand(side)
             for frame, qpos in enumerate(performance.qpos):
@@ -236,7 +255,7 @@ class _Scene:
     def why_missed(self, frame: int, key: int) -> tuple[Cause, int, int]:
         """Cause, hand and finger for a key that should have been down."""
         fingers = np.argwhere(self.finger_key[frame] == key).tolist()
-        # What was not planned would have been missed by sound physics too.
+        # What was not planned would have been missed with stable physics, too.
         if not fingers:
             return Cause.NOT_PLANNED, NOBODY, NOBODY
         if self.broken[frame]:
@@ -283,18 +302,18 @@ class _Scene:
         return (Cause.IDLE if idle else Cause.NEIGHBOUR), hand, finger
 
     def _down_since_wanted(self, frame: int, key: int) -> bool:
-        """Whether the key has been down without a break since it was wanted."""
+        """Whether the key has been down without interruption since it was last wanted."""
         while frame > 0 and self.pressed[frame, key] and not self.wanted[frame, key]:
             frame -= 1
         return bool(self.pressed[frame, key] and self.wanted[frame, key])
 
     def _down_until_wanted(self, frame: int, key: int) -> bool:
-        """Whether the key soon is wanted, and stays down until then."""
+        """Whether the key is wanted soon, and stays down until then."""
         soon = self.wanted[frame + 1 : frame + 1 + _MOST_EARLY, key]
         return bool(soon.any() and self.pressed[frame : frame + 2 + soon.argmax(), key].all())
 
     def _nearest(self, frame: int, key: int) -> tuple[int, int]:
-        """The fingertip that presses a key, or touches it from the side; -1, -1 for none."""
+        """Hand and finger that press a key, or touch it from the side; -1, -1 for none."""
         outside = np.abs(self.tips[frame] - key_centres()[key]) - key_half_sizes()[key]
         distance = np.linalg.norm(np.maximum(outside, 0.0), axis=-1)
         if distance.min() > _TOUCH:

@@ -1,25 +1,25 @@
-"""The summarize of a performance, as `report.json` and a row of `results.json` hold them."""
+"""Summary of a performance: the content of `report.json`, and a row of `results.json`."""
 
 from __future__ import annotations
 
 from pianomime.players.performance import Performance
 
 Row = dict[str, str | int | float]
-"""The summarize of one song."""
+"""Values of one song by name: its summary, or an error."""
 
 
 def summarize(performance: Performance) -> Row:
-    """The summarize of a performance.
+    """Summarize a performance in one row.
 
     Args:
         performance: any performance.
 
     Returns:
-        `song`, `player`, `effort`; `song_seconds`, `frames`; the metrics `precision`, `recall`,
-        `f1`, `onset_f1`, `pedal_f1` (0..1); `plan_seconds`, `simulate_seconds` and
-        `realtime_factor` (their sum into `song_seconds`, higher is better); `notes` of the score
-        and `dropped_notes` that the planner left out; `blow_ups`, frames in which the physics
-        broke.
+        `song`, `player` and `effort`; `song_seconds` and `frames`; the metrics `precision`,
+        `recall`, `f1`, `onset_f1` and `pedal_f1`, 0..1; `plan_seconds`, `simulate_seconds` and
+        `realtime_factor`, which is `song_seconds` divided by their sum; `notes` of the score and
+        `dropped_notes`, those that the planner did not plan; `blow_ups`, the number of frames in
+        which the physics became unstable.
     """
     return {
         "song": performance.score.title,

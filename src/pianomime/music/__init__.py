@@ -1,4 +1,4 @@
-"""Music: scores, MIDI files, rolls, metrics and sound. It knows nothing of robots."""
+"""Music: scores, MIDI files, piano rolls, excerpts, metrics and sound. Nothing of robots."""
 
 from pianomime.music.excerpt import excerpt
 from pianomime.music.metrics import FrameMetrics, frame_metrics, onset_f1, pedal_f1

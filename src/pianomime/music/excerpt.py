@@ -1,4 +1,4 @@
-"""The part of a score that is played."""
+"""Excerpts: the part of a score that is played."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pianomime.music.score import Score
 
 
 def excerpt(score: Score, start: float = 0.0, seconds: float = EXCERPT_SECONDS) -> Score:
-    """The part of a score that is played, from what sounds at `start` or first after it.
+    """Cut out a part of a score that begins with the first sound at or after `start`.
 
     Leading silence is left out, as in the paper's protocol, so that it neither costs time nor
     counts as perfect playing.
 
     Args:
         score: the whole song.
-        start: where to begin [s]; a note that began before and still sounds is part of it.
-        seconds: length of the excerpt at most [s]; may be infinite.
+        start: where to begin [s]; notes that sound at that time are part of the excerpt.
+        seconds: greatest length of the excerpt [s]; may be infinite.
 
     Raises:
         InputError: a time is out of range, or nothing sounds after `start`.

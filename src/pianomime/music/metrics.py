@@ -1,4 +1,4 @@
-"""How well what was played matches what was wanted."""
+"""Metrics: how well the keys, notes and pedal of a performance match those of the score."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+ONSET_TOLERANCE = 0.05
+"""[s] Greatest difference of matching onsets, as is usual in music transcription (mir_eval)."""
 
 
 class FrameMetrics(NamedTuple):
@@ -19,14 +22,14 @@ class FrameMetrics(NamedTuple):
 def frame_metrics(wanted: ArrayLike, pressed: ArrayLike) -> FrameMetrics:
     """Precision, recall and F1 of the pressed keys in each frame, averaged over frames.
 
-    The metric of RoboPianist and PianoMime: what is undefined counts as 1 (precision of a frame
-    in which nothing is pressed, recall of one in which nothing is wanted), so a silent frame with
+    The metric of RoboPianist and PianoMime. Undefined values count as 1: the precision of a frame
+    in which no key is pressed, the recall of one in which no key is wanted. So a silent frame with
     no key pressed counts 1 in all three. F1 is 2 tp / (2 tp + fp + fn), scikit-learn's definition
     since 1.3 with `zero_division=1` (note I of the PianoMime paper).
 
     Args:
-        wanted: (T, 88) bool, the roll of the score.
-        pressed: (T, 88) bool, the keys that were down.
+        wanted: (T, 88) bool, roll of the score.
+        pressed: (T, 88) bool, keys that were down.
 
     Raises:
         ValueError: the shapes differ or are not (T, keys), or there are no frames.
@@ -44,11 +47,11 @@ def frame_metrics(wanted: ArrayLike, pressed: ArrayLike) -> FrameMetrics:
 
 
 def pedal_f1(wanted: ArrayLike, played: ArrayLike) -> float:
-    """F1 of the frames with the pedal down; 1 if it is down in neither.
+    """F1 of the frames with the pedal down; 1 if it is never down in either.
 
     Args:
-        wanted: (T,) bool.
-        played: (T,) bool.
+        wanted: (T,) bool, pedal of the score.
+        played: (T,) bool, pedal of the performance.
 
     Raises:
         ValueError: the shapes differ or are not (T,).
@@ -60,25 +63,28 @@ def pedal_f1(wanted: ArrayLike, played: ArrayLike) -> float:
 def onset_f1(
     wanted: tuple[ArrayLike, ArrayLike],
     played: tuple[ArrayLike, ArrayLike],
-    tolerance: float = 0.05,
+    tolerance: float = ONSET_TOLERANCE,
 ) -> float:
-    """F1 of the struck notes: same key, onsets no further apart than the tolerance.
+    """F1 of note onsets: a match has the same key, and onsets within the tolerance.
 
     Each note is matched at most once and the number of matches is the largest possible, as in
-    mir_eval's onset-only transcription metric; as there, times count to 0.1 ms, so that a
-    difference of exactly the tolerance is a match. Silence played as silence counts 1.
+    mir_eval's onset-only transcription metric; as there, times are rounded to 0.1 ms, so that a
+    difference of exactly the tolerance is a match. No notes in either counts 1.
 
     Args:
         wanted: key (N,) and onset (N,) [s] of the notes of the score.
         played: key (M,) and onset (M,) [s] of the notes that were played.
-        tolerance: [s].
+        tolerance: greatest difference of two onsets that match [s].
+
+    Raises:
+        ValueError: keys and onsets have different shapes, or not (N,).
     """
     wanted_key, wanted_onset = _by_key(*wanted)
     played_key, played_onset = _by_key(*played)
     if len(wanted_key) + len(played_key) == 0:
         return 1.0
-    # On one key, all windows have the same length: pairing the earliest two that are close enough,
-    # and otherwise passing over the earlier one, matches as many as can be.
+    # All windows have the same length, so a greedy match is the largest: on each key, pair the
+    # earliest two notes that are close enough, else skip the earlier one.
     hits = i = j = 0
     while i < len(wanted_key) and j < len(played_key):
         late = round(played_onset[j] - wanted_onset[i], 4)
@@ -101,7 +107,7 @@ def _by_key(key: ArrayLike, onset: ArrayLike) -> tuple[list[int], list[float]]:
 
 
 def _ratio(part: ArrayLike, whole: ArrayLike) -> NDArray[np.float64]:
-    """Part / whole, with 0 / 0 = 1."""
+    """Part / whole, and 1 where the whole is 0."""
     whole = np.asarray(whole, np.float64)
     ratio = np.ones_like(whole)
     np.divide(part, whole, out=ratio, where=whole > 0)

@@ -1,13 +1,13 @@
 """MIDI files to and from scores.
 
-Parsing is symusic's, 0.6 or later (0.5 crashes the process on damaged files): of the two parsers at
-hand it is the strict one (a file that is cut off or has bytes changed is an error), it keeps
-zero-length notes, and it takes milliseconds where mido under pretty_midi takes seconds. Only its
-ticks are used. Its seconds are float32; here they are float64 and computed the way pretty_midi
-does, which decides on which side of a frame boundary a note falls and makes rolls equal to
-RoboPianist's cell for cell. One difference is left: where a file lacks the end of a note, symusic
-leaves out the last note on that key, which pretty_midi rightly keeps (14 notes in all of 6 among
-114 real files, 138 of 257,390 roll cells).
+Files are parsed by symusic 0.6 or later (0.5 crashes the process on damaged files). Compared with
+mido, which pretty_midi uses, it is strict (a truncated or altered file is an error), keeps notes
+of length zero, and takes milliseconds instead of seconds. Only its ticks are used: its seconds are
+float32, while here they are float64 and computed as pretty_midi does, which decides on which side
+of a frame boundary a note falls and makes rolls equal to RoboPianist's cell for cell. One
+difference remains: where the end of a note is missing from a file, symusic drops the last note on
+that key, which pretty_midi rightly keeps (14 notes in 6 of 114 real files, 138 of 257,390 roll
+cells).
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from pianomime.music.score import MAX_SECONDS, Score, ScoreError
 
 SUSTAIN_PEDAL = 64
 PEDAL_DOWN = 64
-"""Control number of the sustain pedal, and the lowest value at which it is down."""
+"""Controller number of the sustain pedal, and the lowest value at which it is down."""
 
 WRITTEN_TICKS_PER_BEAT = 7680
 WRITTEN_BEATS_PER_MINUTE = 120
-"""A frame of 0.05 s is 768 ticks, a power of two times the usual 48, so that the grid survives the
-rounding of floats and rolls come back from a file cell for cell. It is also fine enough for other
+"""A frame of 0.05 s is 768 ticks, a power of two times the usual 48. So frame boundaries survive
+rounding, and rolls are read back from a file cell for cell. Ticks are also fine enough for other
 times, and coarse enough that a silence as long as the longest score fits in MIDI's 28 bits."""
 
 
 def read_midi(path: Path) -> Score:
-    """See `Score.from_midi`."""
+    """Read a MIDI file, see `Score.from_midi`."""
     midi = _parse(path)
     clock = _Clock(midi, path)
     # Drums are left out; their channel has no pitches.
@@ -73,13 +73,13 @@ def read_midi(path: Path) -> Score:
 
 
 def write_midi(score: Score, path: Path) -> None:
-    """See `Score.to_midi`."""
+    """Write a MIDI file, see `Score.to_midi`."""
     with atomic(path) as temporary:
         temporary.write_bytes(midi_bytes(score))
 
 
 def midi_bytes(score: Score) -> bytes:
-    """The content of a MIDI file, see `Score.to_midi`."""
+    """The bytes of a MIDI file, see `Score.to_midi`."""
     import symusic
 
     rate = WRITTEN_TICKS_PER_BEAT * WRITTEN_BEATS_PER_MINUTE / 60
@@ -103,7 +103,7 @@ def midi_bytes(score: Score) -> bytes:
 
 
 def _parse(path: Path) -> Any:
-    """The file as a symusic score in ticks."""
+    """The file as a `symusic.Score` in ticks."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
@@ -131,7 +131,7 @@ def _parse(path: Path) -> Any:
 
 
 class _Clock:
-    """From ticks to seconds, along the tempo changes of one file."""
+    """Converts ticks to seconds with the tempo changes of one file."""
 
     def __init__(self, midi: Any, path: Path) -> None:
         changes = midi.tempos.numpy()
@@ -139,10 +139,10 @@ class _Clock:
         micros_per_beat = changes["mspq"].astype(np.float64)
         if (micros_per_beat <= 0).any():
             raise ScoreError(f"{path} is damaged: it has a tempo of zero")
-        # A file that says nothing begins at 120 beats a minute.
+        # The MIDI standard's default is 120 beats per minute.
         tick = np.append(0, tick)
         micros_per_beat = np.append(500_000.0, micros_per_beat)
-        # In this very order, as pretty_midi computes it: see the top of this file.
+        # In the order in which pretty_midi computes it: see the top of this file.
         self.tick_seconds = 60.0 / ((6e7 / micros_per_beat) * midi.ticks_per_quarter)
         self.tick = tick
         self.second = np.append(0.0, np.cumsum(np.diff(tick) * self.tick_seconds[:-1]))
@@ -156,21 +156,21 @@ class _Clock:
 
 
 def _first_ends(notes: dict[str, NDArray[Any]]) -> NDArray[np.int64]:
-    """(N,) tick at which each note of a track ends: the first end on its key after it began.
+    """(N,) Tick at which each note of a track ends: the first end on its key after its beginning.
 
-    symusic pairs the first beginning on a key with the first end, the second with the second. After
-    one lost end every later note would last until after the next began. In pretty_midi, and so in
-    RoboPianist, an end is the end of all that sounds on the key.
+    symusic pairs the first beginning on a key with the first end, the second with the second, so
+    that after one missing end every later note on the key would last too long. In pretty_midi, and
+    therefore in RoboPianist, an end ends all notes on the key.
     """
     begin = notes["time"].astype(np.int64)
     end: NDArray[np.int64] = begin + notes["duration"]
-    # Keys one after the other on one axis, far enough apart that no search leaves its key.
+    # All keys share one axis, far enough apart that a search cannot reach the next key.
     start_of_key = notes["pitch"].astype(np.int64) * (end.max() + 1)
     ends = np.sort(start_of_key + end)
     first: NDArray[np.int64] = ends[
         np.searchsorted(ends, start_of_key + begin, side="right") % len(ends)
     ]
-    # A note without length keeps none.
+    # A note of length zero stays so.
     first = np.where(end > begin, first - start_of_key, end)
     return first
 
@@ -181,7 +181,7 @@ def _join_doubled(
     end: NDArray[np.int64],
     velocity: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], ...]:
-    """Make one note, the longest and loudest, of those that strike one key at one instant."""
+    """Merge notes that strike one key at one instant into one, the longest and loudest."""
     order = np.lexsort((key, begin))
     key, begin, end, velocity = key[order], begin[order], end[order], velocity[order]
     first = np.flatnonzero(np.append(True, (np.diff(key) != 0) | (np.diff(begin) != 0)))
@@ -194,7 +194,7 @@ def _join_doubled(
 
 
 def _pedal_ticks(tracks: list[Any], last_tick: int) -> NDArray[np.int64]:
-    """(P, 2) ticks of the sustain pedal: a piano has one, whichever track moves it."""
+    """(P, 2) Ticks at which the sustain pedal goes down and up, whichever track moves it."""
     controls = [track.controls.numpy() for track in tracks if len(track.controls)]
     if not controls:
         return np.zeros((0, 2), np.int64)

@@ -1,4 +1,4 @@
-"""From a roll back to notes."""
+"""Notes from a piano roll."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pianomime.music.score import ScoreError
 def notes_from_roll(
     roll: ArrayLike, dt: float = FRAME_SECONDS
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """The notes in a roll: each run of frames with a key down is one.
+    """Read the notes of a roll: each run of frames in which a key is down is one note.
 
     Args:
-        roll: (T, 88) bool, such as the keys that were pressed.
+        roll: (T, 88) bool, such as the keys pressed in a performance.
         dt: length of a frame [s].
 
     Returns:
@@ -32,7 +32,7 @@ def notes_from_roll(
     key, first = np.nonzero(edges == 1)
     _, stop = np.nonzero(edges == -1)
     order = np.lexsort((key, first))
-    # Dividing by the frame rate gives the floats that multiplying by it turns back into the very
-    # same frames (exact for 20 a second); first * dt does not.
+    # Multiplying these times by the frame rate gives exactly the same frames again (at 20 Hz);
+    # with first * dt it does not.
     rate = 1.0 / dt
     return key[order], first[order] / rate, stop[order] / rate

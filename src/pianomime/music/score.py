@@ -1,4 +1,4 @@
-"""Score: what is to be played, in seconds, and its piano roll, in frames."""
+"""Score: the notes and pedal of a piece in seconds, and its piano roll in frames."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS, KEYS
 
 MAX_SECONDS = 4 * 3600.0
-"""Longest score. A damaged MIDI file can claim years, and its roll would not fit in memory."""
+"""[s] Longest score. A damaged MIDI file can last years, and its roll would not fit in memory."""
 
 
 class ScoreError(InputError):
-    """Music that cannot be read or makes no sense; the message is one line for the user."""
+    """Music that cannot be read or is inconsistent; the message is one line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Score:
         title: name of the piece.
 
     Raises:
-        ScoreError: shapes, ranges or times make no sense.
+        ScoreError: shapes do not match, or keys, velocities or times are out of range.
     """
 
     key: NDArray[np.int64]
@@ -77,13 +77,18 @@ class Score:
 
     @classmethod
     def from_midi(cls, path: str | os.PathLike[str]) -> Score:
-        """Read a MIDI file: every track but the drums, tempo changes, sustain pedal (CC64 >= 64).
+        """Read a MIDI file: all tracks except drums, tempo changes, sustain pedal (CC64 >= 64).
 
-        Notes that no piano has (outside MIDI pitch 21..108) are left out with one warning. A key
-        that two tracks strike at the same instant is one note. The title is the file's name.
+        Notes outside the range of a piano (MIDI pitch 21..108) are left out with one warning. Notes
+        of two tracks that strike one key at the same instant become one. The title is the file's
+        name without suffix.
+
+        Args:
+            path: the file.
 
         Raises:
-            ScoreError: no such file, not a MIDI file, a damaged one, or one without piano notes.
+            ScoreError: the file does not exist, is not a MIDI file, is damaged, or has no piano
+                notes.
         """
         from pianomime.music.midi import read_midi
 
@@ -92,7 +97,10 @@ class Score:
     def to_midi(self, path: str | os.PathLike[str]) -> None:
         """Write a MIDI file with one piano track; times are rounded to 1/15360 s.
 
-        Times on the 0.05 s grid, and so rolls, come back from `from_midi` unchanged.
+        Times that are multiples of 0.05 s, and therefore rolls, are read back unchanged.
+
+        Args:
+            path: the file; it is written in one step.
 
         Raises:
             OSError: the file cannot be written.
@@ -103,7 +111,7 @@ class Score:
 
     @classmethod
     def from_roll(cls, roll: ArrayLike, dt: float = FRAME_SECONDS, title: str = "") -> Score:
-        """The score whose keys are down exactly where a roll says so, without pedal.
+        """Make a score from a piano roll, without pedal; its roll is the same again.
 
         Args:
             roll: (T, 88) bool.
@@ -124,11 +132,15 @@ class Score:
 
     @property
     def duration(self) -> float:
-        """When the last note ends [s]; 0 without notes."""
+        """End of the last note [s]; 0 without notes."""
         return float(self.offset.max(initial=0.0))
 
     def clip(self, start: float, end: float) -> Score:
-        """What sounds between two times [s], shifted to begin at 0; notes and pedal are cut.
+        """Cut out all that sounds between two times; notes and pedal are cut at both ends.
+
+        Args:
+            start: beginning [s], which becomes time 0.
+            end: end [s]; may be infinite.
 
         Raises:
             ScoreError: `start` is not before `end`, or nothing sounds between them.
@@ -150,7 +162,7 @@ class Score:
         )
 
     def trim_silence(self) -> Score:
-        """The same music with its first note at 0 s."""
+        """The same music, shifted so that its first note begins at 0 s."""
         if not len(self):
             return self
         start = self.onset[0]
@@ -162,7 +174,10 @@ class Score:
         )
 
     def transpose(self, semitones: int) -> Score:
-        """The same music moved along the keyboard, upward for positive `semitones`.
+        """The same music transposed.
+
+        Args:
+            semitones: distance along the keyboard; positive is upward.
 
         Raises:
             ScoreError: a note would leave the keyboard.
@@ -172,27 +187,33 @@ class Score:
     def frames(self, dt: float = FRAME_SECONDS) -> int:
         """Number of frames T of the roll: floor(duration / dt) + 1.
 
-        So a piece that ends exactly on a frame boundary has one silent frame after it, as in
-        RoboPianist's rolls.
+        A piece that ends exactly on a frame boundary therefore has one silent frame after it, as
+        in RoboPianist's rolls.
+
+        Args:
+            dt: length of a frame [s].
         """
         return math.floor(self.duration * _rate(dt)) + 1
 
     def note_frames(self, dt: float = FRAME_SECONDS) -> NDArray[np.int64]:
-        """The frames in which each note holds its key down.
+        """Frames in which each note holds its key down.
 
         A note begins in frame floor(onset / dt) and ends before frame ceil(offset / dt), but
         lasts at least one frame. A key struck again while it is down is up for that frame, and
         down from the next one on (RoboPianist's rule); it stays down until every note on it has
-        ended. The frames of two notes on one key never overlap, and all together are the roll.
+        ended. The frames of two notes on one key never overlap; together they are the roll.
+
+        Args:
+            dt: length of a frame [s].
 
         Returns:
-            (N, 2) int64: first frame, and one past the last. They are equal for a note that has
-            no frame of its own: its key is struck again before it could come up and go down
-            (within the frame or in the next), or the piece ends before that.
+            (N, 2) int64: first frame, and frame after the last. They are equal for a note without
+            a frame of its own: its key is struck again before it could come up and go down, or
+            the piece ends before that.
         """
         rate = _rate(dt)
-        # Plain rounding of floating-point products, without tolerance: only so are the rolls
-        # those of RoboPianist cell for cell, its rounding noise included.
+        # Products are rounded without a tolerance: only then are rolls equal to RoboPianist's
+        # cell for cell, its rounding errors included.
         begins = np.floor(self.onset * rate).astype(np.int64)
         ends = np.maximum(np.ceil(self.offset * rate).astype(np.int64), begins + 1)
         order = np.lexsort((begins, self.key))
@@ -220,7 +241,7 @@ class Score:
         return np.minimum(frames, self.frames(dt))
 
     def roll(self, dt: float = FRAME_SECONDS) -> NDArray[np.bool_]:
-        """Which keys are down in each frame, see `note_frames`.
+        """Piano roll: the keys that are down in each frame, see `note_frames`.
 
         Args:
             dt: length of a frame [s].
@@ -235,9 +256,12 @@ class Score:
         return down
 
     def pedal_roll(self, dt: float = FRAME_SECONDS) -> NDArray[np.bool_]:
-        """Whether the sustain pedal is down in each frame: its state when the frame ends.
+        """Whether the sustain pedal is down at the end of each frame.
 
-        A pedal still down when the last note ends stays down to the last frame.
+        A pedal that is down when the last note ends stays down until the last frame.
+
+        Args:
+            dt: length of a frame [s].
 
         Returns:
             (T,) bool, one entry for each frame of `roll`.
@@ -251,14 +275,14 @@ class Score:
 
 
 def _rate(dt: float) -> float:
-    """Frames a second. Multiplying by 20.0 is exact where dividing by 0.05 is not."""
+    """Frame rate [Hz]. Multiplying by 20.0 is exact where dividing by 0.05 is not."""
     if not dt > 0:
         raise ValueError(f"dt must be positive, not {dt}")
     return 1.0 / dt
 
 
 def _tidy_pedal(pedal: ArrayLike) -> NDArray[np.float64]:
-    """Intervals in order, those that touch or overlap joined, empty ones left out."""
+    """Sort intervals, merge those that touch or overlap, and leave out empty ones."""
     given = np.array(pedal, np.float64)
     if given.size == 0:
         return np.zeros((0, 2))

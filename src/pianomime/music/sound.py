@@ -1,9 +1,9 @@
-"""The sound of a score, on a sampled piano where there is one and a plain one elsewhere; WAV files.
+"""Sound of a score, by a sampled piano if there is one, else by additive synthesis; WAV files.
 
-The samples are those of the soundfont that the wheel of pretty_midi carries, the synthesizer is
-midirenderer's: both come with `pip install`, without a system library. (symusic, which reads our
-MIDI files, has a synthesizer too; that of 0.6 cannot return its sound to Python, and that of 0.5
-ignores pedal and velocity.)
+The samples are those of the soundfont in pretty_midi's wheel, the synthesizer is midirenderer's:
+both come with `pip install`, without a system library. (symusic, which reads the MIDI files, has a
+synthesizer too; that of 0.6 cannot return its sound to Python, that of 0.5 ignores pedal and
+velocity.)
 """
 
 from __future__ import annotations
@@ -26,31 +26,32 @@ from pianomime.music.midi import midi_bytes
 from pianomime.music.score import Score
 
 SAMPLE_RATE = 48_000
-"""The synthesizer's own [Hz]: any other costs a conversion."""
+"""[Hz] Sample rate of the synthesizer; any other takes a conversion."""
 
 MAX_SECONDS = 600.0
-"""Music beyond it is not made into sound: a song of three hours would take 4 GB."""
+"""[s] Longest sound; that of a song of three hours would take 4 GB."""
 
 PEAK = 0.9
+"""Amplitude of the loudest sample."""
 TAIL = 1.5
-"""Seconds left for the last note to fade."""
+"""[s] Time for the last note to fade."""
 
 RING = 10.0
-"""Seconds after which the pedal need not be held any longer: every string has faded."""
+"""[s] Time after which every string has faded, so that the pedal makes no difference."""
 
 
 def render_audio(score: Score, sample_rate: int = SAMPLE_RATE) -> NDArray[np.float32]:
-    """Play a score on a grand piano.
+    """Synthesize a score as a grand piano plays it.
 
     Notes sound as long as their key or the sustain pedal is down.
 
     Args:
-        score: what to play; all that is later than 10 minutes is left out, with a warning.
-        sample_rate: samples a second.
+        score: the music; what begins after 10 minutes is left out, with a warning.
+        sample_rate: samples per second [Hz].
 
     Returns:
-        (S, 2) float32, left and right, the loudest sample at 0.9; silence for an empty score. It
-        lasts until the last note has been damped, and 1.5 s more.
+        (S, 2) float32, left and right, with the loudest sample at 0.9; silence for an empty
+        score. It ends 1.5 s after the last note has been damped.
     """
     score = _audible(score)
     end = _damped(score)
@@ -66,12 +67,12 @@ def render_audio(score: Score, sample_rate: int = SAMPLE_RATE) -> NDArray[np.flo
 def write_wav(
     path: str | os.PathLike[str], audio: NDArray[np.floating], sample_rate: int = SAMPLE_RATE
 ) -> None:
-    """Write a 16-bit WAV file; samples beyond -1..1 are limited.
+    """Write a 16-bit WAV file.
 
     Args:
-        path: the file, written in one step.
-        audio: (S, C), C channels.
-        sample_rate: samples a second.
+        path: the file; it is written in one step.
+        audio: (S, C) samples of C channels; those beyond -1..1 are clipped.
+        sample_rate: samples per second [Hz].
 
     Raises:
         ValueError: the audio has another shape.
@@ -82,14 +83,14 @@ def write_wav(
         file.setnchannels(audio.shape[1])
         file.setsampwidth(2)
         file.setframerate(sample_rate)
-        # Second by second, because minutes of sound are large enough without copies.
+        # Second by second, to keep copies of long sounds out of memory.
         for first in range(0, len(audio), sample_rate):
             samples = np.clip(audio[first : first + sample_rate], -1, 1) * 32767
             file.writeframes(np.rint(samples).astype("<i2").tobytes())
 
 
 def _audible(score: Score) -> Score:
-    """The score without what is too late to be rendered and pedal that holds only silence."""
+    """The score without notes after `MAX_SECONDS`, and without pedal that holds only silence."""
     if score.duration > MAX_SECONDS:
         warnings.warn(
             f"only the first {MAX_SECONDS / 60:.0f} of {score.duration / 60:.0f} minutes "
@@ -109,7 +110,7 @@ def _audible(score: Score) -> Score:
 
 
 def _damped(score: Score) -> NDArray[np.float64]:
-    """(N,) When the damper falls on each note [s]: key and pedal are up."""
+    """(N,) Time at which each note is damped [s]: both its key and the pedal are up."""
     down, up = np.append(np.full((1, 2), -1.0), score.pedal, axis=0).T
     at = np.searchsorted(down, score.offset, side="right") - 1
     damped: NDArray[np.float64] = np.maximum(score.offset, up[at])
@@ -117,16 +118,16 @@ def _damped(score: Score) -> NDArray[np.float64]:
 
 
 def _play_samples(score: Score, sample_rate: int, audio: NDArray[np.float32]) -> bool:
-    """Write the sound of a sampled piano into (S, 2), or return False where there is none."""
-    # Only located: importing pretty_midi takes longer than the music.
+    """Write the sound of a sampled piano into (S, 2); returns False where there is none."""
+    # Only located, because importing pretty_midi takes longer than synthesizing the music.
     library = find_spec("pretty_midi")
     if library is None or library.origin is None:
         return False
-    # The synthesizer stops at the last event: one more move of the pedal, after all is silent.
+    # The synthesizer stops at the last event, so a pedal move is added after the sound has faded.
     end = len(audio) / sample_rate
     longer = replace(score, pedal=np.append(score.pedal, [[end - 0.01, end]], axis=0))
     try:
-        # Missing on platforms for which it has no wheel, and so is the soundfont from a source
+        # There is no wheel of midirenderer for some platforms, and no soundfont in the source
         # distribution of pretty_midi.
         from midirenderer import render_wave_from
 
@@ -145,7 +146,7 @@ def _play_samples(score: Score, sample_rate: int, audio: NDArray[np.float32]) ->
 
 
 def _read_wav(content: bytes) -> tuple[NDArray[Any], int]:
-    """(S, 2) samples of 16 bits, and how many a second."""
+    """(S, 2) 16-bit samples, and their rate [Hz]."""
     with wave.open(io.BytesIO(content)) as file:
         samples = np.frombuffer(file.readframes(file.getnframes()), "<i2")
         return samples.reshape(-1, 2), file.getframerate()
@@ -154,13 +155,13 @@ def _read_wav(content: bytes) -> tuple[NDArray[Any], int]:
 def _play_partials(
     score: Score, end: NDArray[np.float64], sample_rate: int, audio: NDArray[np.float32]
 ) -> None:
-    """Add the sound of a plain piano, six decaying partials a key, to (S, 2); bass to the left.
+    """Add the sound of six decaying partials per key, with the bass to the left.
 
     Args:
-        score: what to play.
-        end: (N,) when each note is damped [s].
-        sample_rate: samples a second.
-        audio: written to.
+        score: the music.
+        end: (N,) time at which each note is damped [s].
+        sample_rate: samples per second [Hz].
+        audio: (S, 2) the sound is added to this array.
     """
     release = np.exp(-np.arange(sample_rate // 2) / (0.08 * sample_rate)).astype(np.float32)
     for key in np.unique(score.key).tolist():
@@ -169,14 +170,14 @@ def _play_partials(
         string = np.zeros(round(7 * ring * sample_rate), np.float32)
         for partial in range(1, 7):
             if partial * pitch < sample_rate / 2:
-                # High partials fade first, so they are over sooner.
+                # Higher partials fade sooner.
                 time = np.arange(len(string) // partial) / sample_rate
                 decay = np.exp(-time * partial / ring) / partial**1.5
                 string[: len(time)] += decay * np.sin(2 * np.pi * partial * pitch * time)
         place = np.pi / 4 + (key - 43.5) / 43.5 * np.pi / 10
         sides = np.array([np.cos(place), np.sin(place)], np.float32)
         notes = np.flatnonzero(score.key == key)
-        # A key that is struck again stops what it sounded before.
+        # A key that is struck again stops its previous note.
         stop = np.minimum(end[notes], np.append(score.onset[notes[1:]], np.inf))
         first = np.rint(score.onset[notes] * sample_rate).astype(int)
         held = np.rint((stop - score.onset[notes]) * sample_rate).astype(int)

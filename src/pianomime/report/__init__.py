@@ -1,4 +1,4 @@
-"""What a person looks at: the pictures, the page."""
+"""Reports: pictures, sound and a page of a performance, and pictures of a diagnosis."""
 
 from pianomime.keyboard import key_name
 from pianomime.report.diagnosis import DIAGNOSIS_FILES, write_diagnosis

@@ -1,4 +1,4 @@
-"""What went wrong, to look at: a piano roll coloured by cause, and what each cause cost."""
+"""Picture and data of a diagnosis: a piano roll coloured by cause, and a bar for each cause."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from pianomime.players.performance import Performance
 from pianomime.report.roll import LEFT_EDGE, LIGHT, RIGHT_EDGE, Layer, Lines, corners, runs, sheet
 
 DIAGNOSIS_FILES = ("diagnosis.json", "diagnosis.png")
-"""What `write_diagnosis` writes."""
+"""All files that `write_diagnosis` writes."""
 
 _THEME = LIGHT
-# Cold colours for what was missed, warm ones for what was wrong.
+# Cold colours for missed keys, warm ones for wrong keys.
 _COLOURS = {
     Cause.NOT_PLANNED: "#1f3a93",
     Cause.PLANNED_ASIDE: "#7a5cc9",
@@ -38,14 +38,14 @@ _HEAD, _BAR, _GAP = 0.75, 0.27, 0.55  # [inches]
 
 
 def write_diagnosis(performances: Sequence[Performance], folder: Path) -> list[Diagnosis]:
-    """Write `DIAGNOSIS_FILES`.
+    """Diagnose performances and write `DIAGNOSIS_FILES`.
 
     Args:
-        performances: what to diagnose; of more than one, the picture shows only the sums.
-        folder: where to; must exist.
+        performances: performances to diagnose; the picture of more than one has no piano roll.
+        folder: an existing folder for the files.
 
     Returns:
-        An diagnosis for each performance.
+        A diagnosis of each performance.
 
     Raises:
         ValueError: a performance has no plan.
@@ -90,7 +90,7 @@ def _draw(performances: Sequence[Performance], diagnoses: Sequence[Diagnosis], p
 
 
 def _draw_bars(figure: Figure, sums: Sequence[Total], high: float) -> None:
-    """A bar a cause; they are the legend of the roll too."""
+    """Draw one bar for each cause, which is also the legend of the piano roll."""
     height = figure.get_figheight()
     names = 0.22
     axes = figure.add_axes(
@@ -125,7 +125,7 @@ def _draw_bars(figure: Figure, sums: Sequence[Total], high: float) -> None:
 
 
 def _layers(performance: Performance, faults: Sequence[Fault]) -> list[Layer]:
-    """What went right in grey, every fault in the colour of its cause."""
+    """Correct keys in grey, every fault in the colour of its cause."""
     right = runs(performance.score.roll() & performance.pressed)
     layers = [Layer(corners(right), _THEME.wanted[2], _THEME.wanted[2])]
     for cause, colour in _COLOURS.items():

@@ -1,4 +1,4 @@
-"""MP3 for the report page: a tenth of a WAV's size, and played by every browser."""
+"""MP3 sound for the report page: a tenth of the size of a WAV, and played by every browser."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ _BITS_PER_SECOND = 128_000
 
 
 def mp3(audio: NDArray[np.float32], sample_rate: int) -> bytes:
-    """Encode sound.
+    """Encode sound as MP3.
 
     Args:
         audio: (S, 2) samples, -1..1.
-        sample_rate: samples a second.
+        sample_rate: samples per second [Hz].
     """
     buffer = io.BytesIO()
     with av.open(buffer, "w", format="mp3") as container:
-        # At this rate the encoder's quicker search cannot be told from its thorough one.
+        # At this rate, the encoder's fast search sounds like its thorough one.
         stream = container.add_stream(
             "libmp3lame", rate=sample_rate, layout="stereo", options={"compression_level": "7"}
         )
         stream.bit_rate = _BITS_PER_SECOND
-        # Second by second, because minutes of sound are large enough without copies.
+        # Second by second, to keep copies of long sounds out of memory.
         for first in range(0, len(audio), sample_rate):
             samples = np.ascontiguousarray(audio[first : first + sample_rate].T, np.float32)
             frame = av.AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")

@@ -1,4 +1,4 @@
-"""`report.html`: one page that holds everything there is to see and hear, and needs no network."""
+"""`report.html`: one self-contained page with sound, pictures and metrics, without the network."""
 
 from __future__ import annotations
 
@@ -87,12 +87,12 @@ $film<section>
 </picture>
 </section>
 <section>
-<h2>In numbers</h2>
+<h2>Summary</h2>
 <table>
 $rows</table>
 </section>
-<footer>Made by PianoMime $version. F1 counts keys down in every twentieth of a second;
-a note's onset counts when it is within 50 ms.</footer>
+<footer>Made by PianoMime $version. F1 compares the keys that are down in every twentieth of a
+second; onset F1 compares the beginnings of notes, within 50 ms.</footer>
 </main>
 </body>
 </html>
@@ -109,16 +109,16 @@ _ROWS = {
     "song_seconds": ("Length of the song", "{:.1f} s"),
     "frames": ("Frames of 0.05 s", "{}"),
     "notes": ("Notes in the score", "{}"),
-    "dropped_notes": ("Notes left out: more than ten fingers can reach", "{}"),
-    "blow_ups": ("Frames in which the physics broke", "{}"),
+    "dropped_notes": ("Notes not planned: out of reach of ten fingers", "{}"),
+    "blow_ups": ("Frames in which the physics became unstable", "{}"),
     "plan_seconds": ("Time to plan", "{:.2f} s"),
     "simulate_seconds": ("Time to simulate", "{:.2f} s"),
-    "realtime_factor": ("Seconds of music a second of computing", "{:.1f}"),
+    "realtime_factor": ("Seconds of music per second of computing", "{:.1f}"),
 }
 
 
 def page(
-    numbers: Row,
+    summary: Row,
     version: str,
     played: bytes,
     wanted: bytes,
@@ -126,41 +126,41 @@ def page(
     dark_picture: bytes,
     film: bytes | None,
 ) -> str:
-    """The report as one self-contained HTML page.
+    """Make the report as one self-contained HTML page.
 
     Args:
-        numbers: what `pianomime.evaluation.summary` gives.
-        version: of PianoMime.
+        summary: the performance's row of `pianomime.evaluation.summary.summarize`.
+        version: version of PianoMime.
         played: MP3 of the performance.
         wanted: MP3 of the score.
         picture: PNG of the piano roll for light pages.
-        dark_picture: the same for dark pages.
-        film: MP4, if there is one.
+        dark_picture: PNG of the piano roll for dark pages.
+        film: MP4 of the performance, or None.
     """
     tiles = (
-        f"<div><dt>{label}</dt><dd>{numbers[name]:.3f}</dd></div>\n"
+        f"<div><dt>{label}</dt><dd>{summary[name]:.3f}</dd></div>\n"
         for name, label in _TILES.items()
     )
     rows = (
-        f"<tr><td>{label}</td><td>{form.format(numbers[name])}</td></tr>\n"
+        f"<tr><td>{label}</td><td>{form.format(summary[name])}</td></tr>\n"
         for name, (label, form) in _ROWS.items()
     )
     film_section = warning = ""
     if film is not None:
         film_section = (
-            "<section>\n<h2>Film</h2>\n"
+            "<section>\n<h2>Video</h2>\n"
             f'<video controls preload="metadata" src="{_data("video/mp4", film)}"></video>\n'
             "</section>\n"
         )
-    if numbers["blow_ups"]:
+    if summary["blow_ups"]:
         warning = (
-            '<section class="warning">The physics broke during this performance and the hands '
-            "had to be put back: the numbers may be worse than the player.</section>\n"
+            '<section class="warning">The physics became unstable during this performance, and the '
+            "hands were put back: the metrics may be worse than the player.</section>\n"
         )
     return _PAGE.substitute(
-        song=escape(str(numbers["song"])),
-        player=escape(str(numbers["player"])),
-        effort=numbers["effort"],
+        song=escape(str(summary["song"])),
+        player=escape(str(summary["player"])),
+        effort=summary["effort"],
         version=escape(version),
         tiles="".join(tiles),
         rows="".join(rows),

@@ -1,4 +1,4 @@
-"""The piano roll: what was wanted, played, missed and wrong, coloured by hand."""
+"""Picture of the piano roll: notes played, missed and wrong, coloured by hand."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pianomime.players.performance import Performance
 from pianomime.report.roll import LIGHT, Layer, Lines, Theme, corners, legend, runs, sheet
 
 _NOBODY = 2
-"""Index, beside LEFT and RIGHT, of the colour of notes that no hand was given."""
+"""Index, after LEFT and RIGHT, of the colour of notes that were assigned to no hand."""
 _HEAD = 1.05  # [inches]
 
 
@@ -23,9 +23,9 @@ def draw(performance: Performance, path: str | os.PathLike[str], theme: Theme = 
     """Draw the piano roll of a performance into a PNG file.
 
     Args:
-        performance: what to draw.
+        performance: the performance to draw.
         path: the file to write.
-        theme: its colours.
+        theme: the colours.
     """
     lines = Lines.of(performance)
     metrics = performance.metrics()
@@ -60,7 +60,7 @@ def _layers(performance: Performance, theme: Theme) -> list[Layer]:
 
 
 def _hand_of_cell(performance: Performance) -> NDArray[np.int8]:
-    """(T, 88) the hand that a note was given to, `_NOBODY` where there is none."""
+    """(T, 88) Hand that each note was assigned to, `_NOBODY` where there is none."""
     hand = np.full(performance.pressed.shape, _NOBODY, np.int8)
     if performance.plan is not None:
         score = performance.score
@@ -73,7 +73,7 @@ def _hand_of_cell(performance: Performance) -> NDArray[np.int8]:
 
 
 def _entries(performance: Performance, theme: Theme) -> list[Artist]:
-    """The legend."""
+    """Entries of the legend."""
 
     def box(colour: str, edge: str, label: str) -> Patch:
         return Patch(facecolor=colour, edgecolor=edge, linewidth=0.9, label=label)
@@ -86,7 +86,7 @@ def _entries(performance: Performance, theme: Theme) -> list[Artist]:
         box(theme.wrong, theme.wrong, "wrong"),
     ]
     if performance.plan is None or performance.dropped_notes:
-        entries.append(box(theme.wanted[_NOBODY], theme.hands[_NOBODY], "given to no hand"))
+        entries.append(box(theme.wanted[_NOBODY], theme.hands[_NOBODY], "assigned to no hand"))
     if performance.pedal.any():
         entries.append(Line2D([], [], color=theme.hands[_NOBODY], linewidth=4, label="pedal"))
     if len(performance.blow_ups):

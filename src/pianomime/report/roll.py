@@ -1,4 +1,4 @@
-"""What every picture of a piano roll is drawn on: colours, lines of music, heading."""
+"""Common parts of pictures of piano rolls: colours, lines of music, heading, legend."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pianomime.keyboard import FRAME_RATE, KEYS, LOWEST_PITCH, key_name
+from pianomime.keyboard import BLACK, FRAME_RATE, KEYS, KEYS_PER_OCTAVE, LOWEST_PITCH, key_name
 from pianomime.players.performance import Performance
 
 WIDTH = 12.0
-"""Of every picture [inches]."""
+"""[inches] Width of every picture."""
 LEFT_EDGE, RIGHT_EDGE = 0.055, 0.98
-"""Between which lines of music and headings lie, as shares of the width."""
+"""Left and right end of lines of music and headings, as shares of the width."""
 
 _ROW_SECONDS = 16.0
-"""Music on a line at most: semiquavers at a quick tempo can still be told apart."""
+"""[s] Most music on one line, on which fast semiquavers are still separate."""
 _MOST_ROWS = 24
-"""More music than fits on these lines (over 6 minutes) is packed more densely."""
-_FEWEST_KEYS = 36
-_BLACK = (1, 3, 6, 8, 10)  # within an octave from C
+"""Longer music, of more than 6 minutes, is drawn more densely on this many lines."""
+_FEWEST_KEYS = 3 * KEYS_PER_OCTAVE
+"""Keys that a line shows at least."""
 _FOOT = 0.2  # [inches]
 
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours of a picture; the hands', left, right and neither, are those of the film."""
+    """Colours of a picture; `hands` and `wanted` are those of left, right and no hand."""
 
     paper: str
     black_keys: str
@@ -71,8 +71,9 @@ class Layer(NamedTuple):
     """Boxes of one colour on a roll.
 
     Attributes:
-        corners: (M, 4, 2) [s, keys], as `corners` gives them.
-        face, edge: colours.
+        corners: (M, 4, 2) corners of M boxes [s, keys], as `corners` returns them.
+        face: colour of their faces.
+        edge: colour of their edges.
     """
 
     corners: NDArray[np.float64]
@@ -82,13 +83,14 @@ class Layer(NamedTuple):
 
 @dataclass(frozen=True)
 class Lines:
-    """How the roll of a performance is broken into lines of music.
+    """How the roll of a performance is laid out in lines of music.
 
     Attributes:
         rows: number of lines.
-        row_seconds: music on each [s].
-        low, high: lowest and one past the highest key to show.
-        broken: [s] when the physics broke.
+        row_seconds: length of the music on each line [s].
+        low: lowest key to show.
+        high: key after the highest one to show.
+        broken: times at which the physics became unstable [s].
     """
 
     rows: int
@@ -99,8 +101,8 @@ class Lines:
 
     @classmethod
     def of(cls, performance: Performance) -> Lines:
-        """The lines that all that was wanted and played fits on."""
-        # A score of 30 s has 601 frames; the silent last one is not worth a line.
+        """Lay out lines that show all keys of the score and of the performance."""
+        # A score of 30 s has 601 frames; the silent last one needs no line of its own.
         seconds = performance.song_seconds - 0.1
         rows = min(_MOST_ROWS, max(1, math.ceil(seconds / _ROW_SECONDS)))
         broken = tuple(float(frame) / FRAME_RATE for frame in performance.blow_ups)
@@ -108,7 +110,7 @@ class Lines:
 
     @property
     def height(self) -> float:
-        """Of all lines together [inches]."""
+        """Height of all lines together [inches]."""
         return self.rows * self._row_height + _FOOT
 
     @property
@@ -116,7 +118,13 @@ class Lines:
         return 0.6 + 0.052 * (self.high - self.low)
 
     def draw(self, figure: Figure, layers: Sequence[Layer], theme: Theme) -> None:
-        """Draw the lines at the foot of a figure, the last layer on top."""
+        """Draw the lines at the bottom of a figure.
+
+        Args:
+            figure: with at least `height` of free space.
+            layers: boxes to draw; later layers cover earlier ones.
+            theme: the colours.
+        """
         height = figure.get_figheight()
         for row in range(self.rows):
             bottom = self.height - (row + 1) * self._row_height + 0.35
@@ -147,14 +155,22 @@ class Lines:
 
 
 def corners(runs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(M, 4, 2) corners [s, keys] of the boxes of runs (M, 3): first frame, end frame, key."""
+    """(M, 4, 2) Corners of boxes [s, keys].
+
+    Args:
+        runs: (M, 3) first frame, frame after the last one, and key of each box.
+    """
     start, end = runs[:, 0] / FRAME_RATE, runs[:, 1] / FRAME_RATE
     low, high = runs[:, 2] + 0.08, runs[:, 2] + 0.92
     return np.stack([start, low, start, high, end, high, end, low], axis=1).reshape(-1, 4, 2)
 
 
 def runs(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(M, 3) first frame, end frame and column of each unbroken run of true cells (T, K)."""
+    """(M, 3) First frame, frame after the last one, and column of each run of true cells.
+
+    Args:
+        cells: (T, K) bool.
+    """
     padded = np.pad(cells, ((1, 1), (0, 0))).astype(np.int8).T
     column, start = np.nonzero(np.diff(padded) == 1)
     _, end = np.nonzero(np.diff(padded) == -1)
@@ -162,13 +178,13 @@ def runs(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def sheet(height: float, title: str, remark: str, theme: Theme) -> Figure:
-    """An empty picture with a title at the top left and a remark at the top right.
+    """Make an empty picture with a title at the top left and a remark at the top right.
 
     Args:
-        height: of the picture [inches].
-        title: shortened if it is too long.
+        height: height of the picture [inches].
+        title: title, which is shortened if it is too long.
         remark: one line.
-        theme: colours.
+        theme: the colours.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=110, facecolor=theme.paper)
     figure.text(
@@ -183,7 +199,7 @@ def sheet(height: float, title: str, remark: str, theme: Theme) -> Figure:
 
 
 def legend(figure: Figure, entries: Sequence[Artist], theme: Theme) -> None:
-    """One line of a legend below the title."""
+    """Add a legend in one line below the title."""
     figure.legend(
         handles=list(entries), loc="center left",
         bbox_to_anchor=(0.047, 1 - 0.7 / figure.get_figheight()),
@@ -193,7 +209,7 @@ def legend(figure: Figure, entries: Sequence[Artist], theme: Theme) -> None:
 
 
 def _key_range(performance: Performance) -> tuple[int, int]:
-    """Lowest and one past the highest key to show."""
+    """Lowest key to show, and the key after the highest one."""
     used = np.flatnonzero(performance.pressed.any(axis=0) | performance.score.roll().any(axis=0))
     low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (40, 40)
     middle = (low + high) / 2
@@ -203,11 +219,11 @@ def _key_range(performance: Performance) -> tuple[int, int]:
 
 
 def _paper(axes: Axes, low: int, high: int, theme: Theme) -> None:
-    """Stripes for black keys, a line and a label for every C."""
+    """Draw stripes for black keys, and a line and a label for every C."""
     for key in range(low, high):
-        if (key + LOWEST_PITCH) % 12 in _BLACK:
+        if BLACK[key]:
             axes.axhspan(key, key + 1, color=theme.black_keys, linewidth=0)
-    octaves = [key for key in range(low, high) if (key + LOWEST_PITCH) % 12 == 0]
+    octaves = [key for key in range(low, high) if (key + LOWEST_PITCH) % KEYS_PER_OCTAVE == 0]
     for key in octaves:
         axes.axhline(key, color=theme.lines, linewidth=0.8)
     axes.set_yticks([key + 0.5 for key in octaves], [key_name(key) for key in octaves])

@@ -1,4 +1,4 @@
-"""Everything that a person looks at or listens to, made from a performance."""
+"""The report of a performance: metrics, MIDI, sound, pictures, video, and a page with all of it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from matplotlib.colors import to_rgb
 from pianomime import __version__
 from pianomime.evaluation.summary import Row, summarize
 from pianomime.music import render_audio, write_wav
+from pianomime.music.sound import SAMPLE_RATE
 from pianomime.players.performance import Performance
+from pianomime.progress import Progress
 from pianomime.report.mp3 import mp3
 from pianomime.report.page import page
 from pianomime.report.picture import draw
@@ -29,30 +31,27 @@ FILES = (
     "piano_roll.png",
     "piano_roll_dark.png",
 )
-"""Every file that a report may consist of; the film is the only one that may be missing."""
-
-SAMPLE_RATE = 48_000
-"""Of all sound in a report [Hz]: what the synthesizer gives without conversion."""
+"""All files of a report; only the video may be missing."""
 
 
 def write_report(
     performance: Performance,
     folder: Path,
     video: bool,
-    progress: Callable[[str, int, int], None],
+    progress: Progress,
     note: Callable[[str], None],
 ) -> Row:
-    """Write a report: `FILES`.
+    """Write the files of a report, `FILES`.
 
     Args:
-        performance: what to report on.
-        folder: where to; must exist.
-        video: whether to render a film, where this machine can.
-        progress: told the stage, the steps done and the steps in all (0: unknown).
-        note: told, in one line, what could not be made and why.
+        performance: the performance to report on.
+        folder: an existing folder for the files.
+        video: whether to render a video, if this machine can.
+        progress: called in the phases "reporting" and "rendering".
+        note: called with one line that says what could not be made and why.
 
     Returns:
-        The summarize, as in `report.json`.
+        The summary, as in `report.json`.
     """
     progress("reporting", 0, 0)
     row = summarize(performance)
@@ -73,8 +72,8 @@ def write_report(
                 performance.pressed,
                 audio,
                 SAMPLE_RATE,
-                progress=lambda done, total: progress("filming", done, total),
                 colours=colours,
+                progress=progress,
             )
         except RenderUnavailable as error:
             note(str(error))

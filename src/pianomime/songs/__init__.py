@@ -1,27 +1,30 @@
-"""Songs that come with PianoMime: public-domain pieces, written down by hand in `notation`."""
+"""Bundled songs: public-domain pieces, written by hand in `notation`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from pianomime.music import ScoreError
+from pianomime.errors import unknown_name
 
 _FOLDER = Path(__file__).parent
 
 
 def names() -> list[str]:
-    """The names of the bundled songs, sorted."""
+    """Names of the bundled songs, sorted."""
     return sorted(file.stem for file in _FOLDER.glob("*.mid"))
 
 
 def path(name: str) -> Path:
     """The MIDI file of a bundled song.
 
+    Args:
+        name: one of `names()`.
+
     Raises:
-        ScoreError: there is no such song.
+        UnknownNameError: there is no such song.
     """
     if name not in names():
-        raise ScoreError(f"no bundled song {name!r}; there are {', '.join(names())}")
+        raise unknown_name("bundled song", name, names())
     return _FOLDER / f"{name}.mid"
 
 

@@ -1,4 +1,4 @@
-"""`python -m pianomime.songs`: write the bundled MIDI files anew from their notation."""
+"""`python -m pianomime.songs` writes the bundled MIDI files from their notation."""
 
 from pathlib import Path
 

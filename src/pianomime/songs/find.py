@@ -1,4 +1,4 @@
-"""From what a person names, a file or a bundled song, to MIDI files."""
+"""MIDI files from the names that a user gives: files, folders and bundled songs."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from pianomime import songs
-from pianomime.errors import InputError
+from pianomime.errors import InputError, UnknownNameError, closest
 
 _SUFFIXES = (".mid", ".midi")
 
 
 def find_song(name: str) -> Path:
-    """The MIDI file that a name stands for.
+    """The MIDI file of a name.
 
     Args:
-        name: path of a file, or name of a bundled song or a part of it: "ode to joy" will do.
+        name: path of a file; or name of a bundled song, or a part of it such as "ode to joy".
 
     Raises:
-        InputError: there is neither, or no name.
+        InputError: the name is empty or that of a folder.
+        UnknownNameError: there is neither a file nor one bundled song of that name.
     """
     if not name.strip():
-        raise InputError("a song with no name; `pianomime songs` lists those there are")
+        raise InputError("the name of a song is empty; `pianomime songs` lists the bundled ones")
     path = Path(name)
     if path.is_dir():
         raise InputError(f"{name}: is a folder; name one song, or use `pianomime evaluate`")
@@ -31,19 +32,31 @@ def find_song(name: str) -> Path:
     found = [song for song in songs.names() if asked in song]
     if asked in found or len(found) == 1:
         return songs.path(asked if asked in found else found[0])
-    raise InputError(
-        f"{name}: no such file, nor one bundled song; those are: {', '.join(songs.names())}"
+    if len(found) > 1:
+        raise UnknownNameError(f"{name}: is part of more than one bundled song: {', '.join(found)}")
+    hint = closest(asked.removesuffix(path.suffix.lower()), songs.names())
+    hint = hint or _closest_file(path) or ";"
+    raise UnknownNameError(
+        f"{name}: no such file or bundled song{hint} bundled are: {', '.join(songs.names())}"
     )
 
 
+def _closest_file(path: Path) -> str:
+    """The MIDI files of the same folder with the most similar names, as the end of a message."""
+    if not path.parent.is_dir():
+        return ""
+    beside = (file.name for file in path.parent.iterdir() if file.suffix.lower() in _SUFFIXES)
+    return closest(path.name, beside)
+
+
 def find_songs(names: Iterable[str | Path]) -> list[Path]:
-    """All MIDI files that names stand for, each once, in order.
+    """The MIDI files of several names, each once, in order.
 
     Args:
-        names: files, folders (all their MIDI files, also those further down) and bundled songs.
+        names: files, folders (with all MIDI files in them and below them) and bundled songs.
 
     Raises:
-        InputError: a name stands for nothing, or a folder holds no MIDI file.
+        InputError: a name is unknown, a folder holds no MIDI file, or there are no names.
     """
     found: dict[Path, None] = {}
     for name in names:

@@ -1,9 +1,9 @@
-"""The bundled songs as text, and how to read it.
+"""The bundled songs as text, and the reader of that notation.
 
-A voice is a line of notes one after the other. `E4` is a note (C4 is the middle C; `#` and `b` as
-usual), `C4+E4+G4` a chord, `r` a rest, and in a pedal line `P` is the pedal down. `*1.5` after it
-is its length in beats; without, it lasts as long as the voice's unit. `|` ends a bar (or
-several, over which a note is held) and is checked.
+A voice is a sequence of notes. `E4` is a note (C4 is the middle C; `#` and `b` as usual),
+`C4+E4+G4` a chord, `r` a rest, and in a pedal line `P` is the pedal down. `*1.5` after any of these
+is its length in beats; without it, it lasts one unit of the voice. `|` marks the end of a bar (or
+of several, over which a note is held); a bar that does not add up is an error.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pianomime.music import Score, ScoreError
 
 SEMITONES = {"C": 0, "D": 2, "E": 4, "F": 5, "G": 7, "A": 9, "B": 11}
 RELEASE = 0.05
-"""Seconds by which every note ends early, so that a key can be struck again."""
+"""[s] Time by which every note ends early, so that its key can be struck again."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Voice:
 
 
 @dataclass(frozen=True)
-class Song:
+class Piece:
     """A piece.
 
     Attributes:
@@ -56,7 +56,7 @@ class Song:
     upbeat: float = 0.0
 
 
-def to_score(song: Song) -> Score:
+def to_score(song: Piece) -> Score:
     """Read the notation.
 
     Raises:
@@ -87,7 +87,7 @@ def to_score(song: Song) -> Score:
     )
 
 
-def _events(song: Song, text: str, unit: float) -> list[tuple[list[str], float, float]]:
+def _events(song: Piece, text: str, unit: float) -> list[tuple[list[str], float, float]]:
     """What sounds in one line: names, start and length, both in beats."""
     events = []
     start, now, bar_end = 0.0, 0.0, song.upbeat or song.bar
@@ -114,7 +114,7 @@ def _key(name: str) -> int:
     return 12 * (int(octave) + 1) + semitone - LOWEST_PITCH
 
 
-def _bach_prelude() -> Song:
+def _bach_prelude() -> Piece:
     """Every bar but the last three breaks a chord of five notes, twice."""
     chords = """
         C4 E4 G4 C5 E5    C4 D4 A4 D5 F5    B3 D4 G4 D5 F5    C4 E4 G4 C5 E5
@@ -139,7 +139,7 @@ def _bach_prelude() -> Song:
         r r G4 B4 D5 F5 D5 B4 D5 B4 G4 B4 D4 F4 E4 D4 |
         E4+G4+C5*4 |
     """
-    return Song(
+    return Piece(
         title="J. S. Bach: Prelude in C major, BWV 846",
         tempo=66,
         bar=4,
@@ -148,7 +148,7 @@ def _bach_prelude() -> Song:
     )
 
 
-def _c_major_study() -> Song:
+def _c_major_study() -> Piece:
     """Both hands an octave apart."""
     right = """
         C4 D4 E4 F4 G4 A4 B4 C5 | D5 E5 F5 G5 A5 B5 C6 B5 | A5 G5 F5 E5 D5 C5 B4 A4 |
@@ -157,7 +157,7 @@ def _c_major_study() -> Song:
     left = "".join(str(int(sign) - 1) if sign in "3456" else sign for sign in right)
     # Lengths are digits too, and the left hand's last chord is open.
     left = left.replace("*3 |", "*4 |").replace("C3+E3+G3", "C3+G3")
-    return Song(
+    return Piece(
         title="Scale and arpeggio in C major",
         tempo=96,
         bar=4,
@@ -165,7 +165,7 @@ def _c_major_study() -> Song:
     )
 
 
-def _twinkle() -> Song:
+def _twinkle() -> Piece:
     broken = {
         "C": "C3 G3 E3 G3 ",
         "F": "C3 A3 F3 A3 ",
@@ -179,7 +179,7 @@ def _twinkle() -> Song:
         G4 G4 F4 F4 | E4 E4 D4*2 | G4 G4 F4 F4 | E4 E4 D4*2 |
         C4 C4 G4 G4 | A4 A4 G4*2 | F4 F4 E4 E4 | D4 D4 C4*2 |
     """
-    return Song(
+    return Piece(
         title="Twinkle, Twinkle, Little Star",
         tempo=100,
         bar=4,
@@ -189,7 +189,7 @@ def _twinkle() -> Song:
 
 SONGS = {
     "bach-prelude-c": _bach_prelude(),
-    "beethoven-fur-elise": Song(
+    "beethoven-fur-elise": Piece(
         title="L. van Beethoven: Für Elise, opening",
         tempo=70,
         bar=1.5,
@@ -219,7 +219,7 @@ SONGS = {
         ),
         pedal="r*.5 | " + "r | P*1 r*.5 | P*1 r*.5 | P*1 r*.5 | " * 4,
     ),
-    "beethoven-ode-to-joy": Song(
+    "beethoven-ode-to-joy": Piece(
         title="L. van Beethoven: Ode to Joy",
         tempo=108,
         bar=4,
@@ -246,7 +246,7 @@ SONGS = {
         ),
     ),
     "c-major-study": _c_major_study(),
-    "petzold-minuet-g": Song(
+    "petzold-minuet-g": Piece(
         title="C. Petzold: Minuet in G major, BWV Anh. 114, first part",
         tempo=112,
         bar=3,
@@ -274,7 +274,7 @@ SONGS = {
         ),
     ),
     # In bars 9 to 12 the left hand leaves out the F#4 that the right hand holds.
-    "satie-gymnopedie-1": Song(
+    "satie-gymnopedie-1": Piece(
         title="E. Satie: Gymnopédie No. 1, opening",
         tempo=76,
         bar=3,

@@ -1,4 +1,4 @@
-"""WorldBatch: many worlds at once, on all cores."""
+"""WorldBatch: many simulations that step together, on all cores."""
 
 from __future__ import annotations
 
@@ -23,32 +23,35 @@ from pianomime.world.state import (
     starting_positions,
 )
 
-_NUMBER = 1  # Batch.warning holds (last info, number) of each kind.
+_NUMBER = 1  # Batch.warning holds (last info, number of warnings) of each kind.
 
 
 class WorldBatch(WorldState):
-    """B worlds that step together; each is what one `World` would be, bit for bit.
+    """B worlds that step together; each behaves as one `World` does, bit for bit.
 
     Attributes:
         model: the MuJoCo model, shared by all worlds; read-only.
         pedal: (B,) bool, whether each sustain pedal is down.
-        blow_ups: (B,) int, control steps since each world's last reset in which its physics
-            broke; it is then put back as `World` tells.
+        blow_ups: (B,) int, number of control steps since each world's last reset in which its
+            physics became unstable; it is then recovered as a `World` is.
     """
 
     def __init__(self, worlds: int, threads: int = 0, quiet: bool = False) -> None:
-        """Make worlds, at rest.
+        """Make worlds at rest.
 
         Args:
-            worlds: how many, B.
-            threads: how many of them step at the same time; 0 for one on each core.
-            quiet: whether broken physics goes without a warning.
+            worlds: number of worlds, B.
+            threads: number of threads that step them; 0 for one per core.
+            quiet: do not warn when the physics becomes unstable.
+
+        Raises:
+            ValueError: there are no worlds, or a negative number of threads.
         """
         if worlds < 1 or threads < 0:
             raise ValueError(f"cannot make {worlds} worlds on {threads} threads")
         self.model = world_model()
         self.quiet = quiet
-        # Which keys sleep is not part of MuJoCo's state: each world keeps its own data.
+        # Which bodies sleep is not part of MuJoCo's state, so each world keeps its own data.
         self._batch = Batch(self.model, worlds, threads, persistent=True)
         self.blow_ups = np.zeros(worlds, np.int64)
         self.pedal = np.zeros(worlds, bool)
@@ -59,15 +62,15 @@ class WorldBatch(WorldState):
         return len(self.pedal)
 
     def reset(self, qpos: ArrayLike | None = None, ids: ArrayLike | None = None) -> None:
-        """Put worlds at rest.
+        """Set positions, with all velocities 0 and the pedals up.
 
         Args:
-            qpos: (142,) or (54,) for all alike, or (n, 142) or (n, 54) with a row for each of
-                them, as in `World.reset`.
-            ids: (n,) which worlds; None for all.
+            qpos: (142,) or (54,) for all worlds, or (n, 142) or (n, 54) with a row for each, as
+                in `World.reset`; None for the rest pose.
+            ids: (n,) indices of the worlds; None for all.
 
         Raises:
-            ValueError: if `qpos` has another shape or is not finite.
+            ValueError: `qpos` has another shape or is not finite.
         """
         which = self._which(ids)
         start = np.broadcast_to(starting_positions(qpos), (len(which), LAYOUT.qpos_size))
@@ -76,18 +79,18 @@ class WorldBatch(WorldState):
         self._put(start, which)
 
     def step(self, ctrl: ArrayLike, pedal: ArrayLike = False) -> None:
-        """Hold controls for one control step of 0.05 s.
+        """Simulate one control step of 0.05 s with constant controls.
 
         Args:
-            ctrl: (B, 46) targets of the position actuators, as in `World.step`.
+            ctrl: (B, 46) targets of the position actuators, as in `World.step` [rad, m].
             pedal: (B,) bool, or one for all.
 
         Raises:
-            ValueError: if `ctrl` has another shape or is not finite.
+            ValueError: `ctrl` has another shape or is not finite.
         """
-        wanted = finite(ctrl, "ctrl", (len(self), self.model.nu))
+        targets = finite(ctrl, "ctrl", (len(self), self.model.nu))
         before = self.qpos
-        self._batch.bind("ctrl")[:] = wanted
+        self._batch.bind("ctrl")[:] = targets
         self.pedal[:] = pedal
         self._keep_pressed_keys_awake()
         self._batch.step(nstep=SUBSTEPS)
@@ -100,19 +103,19 @@ class WorldBatch(WorldState):
             self._put(reset_pose_after_instability(before[broken]), broken)
 
     def state(self) -> NDArray[np.float64]:
-        """(B, S) the moment of each world, as `World.state`."""
+        """(B, S) The state of each world, as `World.state` returns it."""
         state: NDArray[np.float64] = self._batch.state.copy()
         return state
 
     def set_state(self, state: ArrayLike, ids: ArrayLike | None = None) -> None:
-        """Go to moments that `state` gave, as `World.set_state` does.
+        """Restore states, as `World.set_state` does.
 
         Args:
-            state: (S,) for all alike, or (n, S).
-            ids: (n,) which worlds; None for all.
+            state: (S,) for all worlds, or (n, S) with a row for each.
+            ids: (n,) indices of the worlds; None for all.
 
         Raises:
-            ValueError: if `state` has another shape or is not finite.
+            ValueError: `state` has another shape or is not finite.
         """
         which = self._which(ids)
         rows = (len(which), mujoco.mj_stateSize(self.model, STATE))

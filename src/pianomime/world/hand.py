@@ -1,4 +1,4 @@
-"""One hand without the piano: kinematics and dynamics for planners and trackers."""
+"""Kinematics and dynamics of one hand without the piano, for planners and trackers."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.world.layout import LAYOUT
+from pianomime.world.layout import LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES, Side, fingertip_sites, hand_model
 
 
 class Hand:
-    """A hand that can be put in any pose.
+    """The kinematics of one hand.
 
     Attributes:
-        model: MuJoCo model of the hand alone, read-only.
+        side: "lh" or "rh".
+        model: MuJoCo model of the hand alone; read-only.
+        data: its MuJoCo state, in the pose that was last asked for.
         low, high: (27,) joint limits [rad, m].
         ctrl_low, ctrl_high: (23,) ranges of the actuators [rad, m].
         gain: (23,) stiffness of the position actuators [N m/rad, N/m].
-        to_ctrl: (23, 27) matrix from joint positions to what the actuators see; the last two
-            joints of each finger hang on one tendon.
+        to_ctrl: (23, 27) matrix from joint positions to actuator lengths, which is also that from
+            joint targets to controls; the two end joints of a finger share a tendon.
         joints: slice of this hand's joints in the positions (142,) of a World.
         actuators: slice of this hand's actuators in the controls (46,) of a World.
     """
@@ -39,7 +41,14 @@ class Hand:
         self._sites = [self.model.site(name).id for name in fingertip_sites(side)]
 
     def points(self, qpos: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(6, 3) [m] world positions of wrist and fingertips, thumb first, at joints (27,)."""
+        """World positions of wrist and fingertips.
+
+        Args:
+            qpos: (27,) joint positions [rad, m].
+
+        Returns:
+            (6, 3) wrist, then fingertips, thumb first [m].
+        """
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self.data)
         points: NDArray[np.float64] = self.data.site_xpos[self._sites]
@@ -48,7 +57,14 @@ class Hand:
     def points_and_jacobian(
         self, qpos: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The points (6, 3) [m] and their Jacobian (6, 3, 27) at joints (27,)."""
+        """The points, as `points` returns them, and their Jacobian.
+
+        Args:
+            qpos: (27,) joint positions [rad, m].
+
+        Returns:
+            (6, 3) points [m] and (6, 3, 27) Jacobian [m/rad, 1].
+        """
         points = self.points(qpos)
         mujoco.mj_comPos(self.model, self.data)
         jacobian = np.empty((len(self._sites), 3, LAYOUT.hand_joints))
@@ -77,8 +93,15 @@ def both_hands() -> tuple[Hand, Hand]:
 
 
 def hand_points(joints: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(B, 2, 6, 3) [m] points of both hands, left first, at joints (B, 54), right then left."""
-    points = np.empty((len(joints), 2, 6, 3))
+    """World positions of wrists and fingertips of both hands.
+
+    Args:
+        joints: (B, 54) joint positions, right hand then left hand [rad, m].
+
+    Returns:
+        (B, 2, 6, 3) hands (left, right), points wrist, thumb .. little [m].
+    """
+    points = np.empty((len(joints), 2, POINT_COUNT, 3))
     for index, hand in enumerate(both_hands()):
         for row, pose in enumerate(joints[:, LAYOUT.among_hands(index)]):
             points[row, index] = hand.points(pose)
@@ -86,7 +109,13 @@ def hand_points(joints: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def by_actuator(finger: float, wrist: float, slide: float) -> NDArray[np.float64]:
-    """(46,) one value for the actuators of fingers, one for wrists and one for forearm slides."""
+    """(46,) A value for each actuator, by the part that it moves.
+
+    Args:
+        finger: value of the actuators of all finger joints.
+        wrist: value of those of the wrists.
+        slide: value of those of the forearms' slides.
+    """
     one = np.full(LAYOUT.hand_actuators, finger)
     one[LAYOUT.wrist_actuators], one[LAYOUT.slide_actuators] = wrist, slide
     return np.tile(one, 2)

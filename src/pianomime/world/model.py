@@ -26,7 +26,7 @@ Side = Literal["rh", "lh"]
 SIDES: tuple[Side, Side] = ("lh", "rh")
 """The sides in plan order (left, right)."""
 FINGER_PREFIXES = ("th", "ff", "mf", "rf", "lf")
-"""Names of the fingers in the model, thumb first."""
+"""Prefixes of the fingers' names in the model, thumb first."""
 
 _GEOM_TYPES = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -34,18 +34,18 @@ _GEOM_TYPES = {
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
 }
-# Keys and hands touch each other, but no hand touches a hand (as in the paper's world).
+# Keys and hands collide with each other; the two hands do not (as in the paper's world).
 _HAND_MASK = {"contype": 1, "conaffinity": 0}
 _KEY_MASK = {"contype": 0, "conaffinity": 1}
 _NO_CONTACT = {"contype": 0, "conaffinity": 0}
-# Never over the keys: not worth looking for contacts.
+# Bodies that are never over the keys: contacts with them need not be looked for.
 _OUT_OF_REACH = ("forearm", "wrist")
 _FOREARM_BASE = {"rh": (0.4, 0.15, 0.13), "lh": (0.4, -0.15, 0.13)}
 _FOREARM_QUAT = (-0.5, -0.5, 0.5, 0.5)
 
 
 def build_spec() -> mujoco.MjSpec:
-    """Piano and both hands, nothing for the eye but plain colours."""
+    """The spec of piano and both hands, with plain colours; `scene_look.dress` adds the looks."""
     spec = _empty_spec()
     add_piano(spec)
     add_hand(spec, "rh")
@@ -56,7 +56,7 @@ def build_spec() -> mujoco.MjSpec:
 @cache
 def world_model() -> mujoco.MjModel:
     """The compiled model of `build_spec`, compiled once; treat it as read-only."""
-    # World tells of broken physics itself; nobody wants MUJOCO_LOG.TXT beside their songs.
+    # World itself reports broken physics; without this MuJoCo writes MUJOCO_LOG.TXT where it runs.
     log = mujoco.MjLogConfig.get()
     log.logto_file = False
     log.logto_console = False
@@ -66,7 +66,11 @@ def world_model() -> mujoco.MjModel:
 
 @cache
 def hand_model(side: Side) -> mujoco.MjModel:
-    """One hand alone, without keys: for kinematics and inverse dynamics. Read-only."""
+    """The compiled model of one hand without the piano, for kinematics and inverse dynamics.
+
+    Args:
+        side: "lh" or "rh". The model is compiled once; treat it as read-only.
+    """
     spec = _empty_spec()
     add_hand(spec, side)
     return spec.compile()
@@ -115,7 +119,7 @@ def add_piano(spec: mujoco.MjSpec) -> None:
 
 
 def add_hand(spec: mujoco.MjSpec, side: Side) -> None:
-    """Add one hand with its sliding forearm; the left is the right mirrored in its x axis."""
+    """Add one hand with its sliding forearm; the left one is the right one mirrored in x."""
     hand = PARAMETERS["hand"]
     mirror = -1.0 if side == "lh" else 1.0
     bodies: dict[str, mujoco.MjsBody] = {}
@@ -166,7 +170,7 @@ def add_hand(spec: mujoco.MjSpec, side: Side) -> None:
 
 
 def fingertip_sites(side: Side) -> list[str]:
-    """Site names of a hand's points in plan order: wrist, thumb, index .. little."""
+    """Names of the sites of a hand's points, in plan order: wrist, thumb, index .. little."""
     return [f"{side}_wrist", *(f"{side}_{finger}_tip" for finger in FINGER_PREFIXES)]
 
 
@@ -181,12 +185,12 @@ def _empty_spec() -> mujoco.MjSpec:
     spec.option.ls_iterations = physics["ls_iterations"]
     spec.option.impratio = physics["impratio"]
     spec.option.gravity = physics["gravity"]
-    # Resting keys (88 of 142 degrees of freedom) sleep until something touches them.
+    # Resting keys, 88 of 142 degrees of freedom, sleep until something touches them.
     spec.option.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-    # MuJoCo 4.0.0 solves islands with sparse Jacobians wrongly once in a while: a finger that
-    # touches two keys is thrown off at 1000 rad/s. Dense ones are right, and faster here.
+    # With sparse Jacobians, MuJoCo 4.0.0 now and then solves islands wrongly: a finger that touches
+    # two keys is thrown off at 1000 rad/s. Dense ones are correct, and faster here.
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    # The convex collider of MuJoCo 3.0, which the paper's world was made with.
+    # The convex collider of MuJoCo 3.0, with which the paper's results were made.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_NATIVECCD)
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
     spec.compiler.degree = False
@@ -196,7 +200,7 @@ def _empty_spec() -> mujoco.MjSpec:
 def _add_joint(body: mujoco.MjsBody, parameters: dict[str, Any], side: Side, mirror: float) -> None:
     slide = parameters.get("type") == "slide"
     x, y, z = parameters["axis"]
-    # Forearms slide along the same world axes on both sides; a mirrored hinge axis turns round.
+    # Forearms slide along the same world axes on both sides; a mirrored hinge axis changes sign.
     axis = (x, y, z) if slide else (x, mirror * y, mirror * z)
     body.add_joint(
         name=f"{side}_{parameters['name']}",
@@ -269,5 +273,5 @@ def _mirror_quat(
 
 
 def _first_order(value: float) -> list[float]:
-    """MuJoCo 4 takes springs and dampers as polynomials; ours are linear."""
+    """Coefficients of a linear spring or damper; MuJoCo 4 takes polynomials."""
     return [value, 0.0, 0.0]

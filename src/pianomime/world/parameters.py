@@ -22,11 +22,11 @@ PARAMETERS: dict[str, Any] = json.loads(
 
 PHYSICS_DT: float = PARAMETERS["physics"]["timestep"]
 SUBSTEPS = round(FRAME_SECONDS / PHYSICS_DT)
-"""Steps of the physics in a control step."""
+"""Physics steps in one control step."""
 
 
 def _of_colour(parameter: str, place: int | None = None) -> np.ndarray:
-    """(88, ...) a parameter that black and white keys have each their own of."""
+    """(88, ...) A parameter of every key, stored once for black and once for white keys."""
     black, white = (
         np.asarray(PARAMETERS["keyboard"][colour][parameter]) for colour in ("black", "white")
     )
@@ -37,7 +37,7 @@ def _of_colour(parameter: str, place: int | None = None) -> np.ndarray:
 
 @cache
 def key_centres() -> np.ndarray:
-    """(88, 3) [m] world position of the middle of each key's box, at rest; read-only."""
+    """(88, 3) World position of the centre of each key's box at rest [m]; read-only."""
     centre = np.empty((KEYS, 3))
     centre[:, 1] = PARAMETERS["keyboard"]["key_y"]
     centre[:, 0], centre[:, 2] = _of_colour("x"), _of_colour("z")
@@ -46,17 +46,17 @@ def key_centres() -> np.ndarray:
 
 @cache
 def key_half_sizes() -> np.ndarray:
-    """(88, 3) [m] half the length (x), width (y) and height (z) of each key; read-only."""
+    """(88, 3) Half the length (x), width (y) and height (z) of each key [m]; read-only."""
     return _read_only(_of_colour("half_size"))
 
 
 @cache
 def key_travel() -> np.ndarray:
-    """(88,) [rad] angle of each key at its stop; 0 is at rest. Read-only."""
+    """(88,) Angle of each key at its stop [rad]; 0 is at rest. Read-only."""
     return _read_only(_of_colour("range", 1))
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
-    # One array serves all callers.
+    # All callers share one cached array.
     array.setflags(write=False)
     return array

@@ -1,4 +1,4 @@
-"""Pictures and films of a performance, drawn with whatever OpenGL the machine has."""
+"""Pictures and videos of a performance, rendered with the OpenGL that the machine has."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from types import TracebackType
@@ -18,17 +20,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pianomime.files import atomic
-from pianomime.keyboard import KEYS
+from pianomime.keyboard import FRAME_RATE, KEYS
+from pianomime.music.sound import SAMPLE_RATE
+from pianomime.progress import Progress, no_progress
 from pianomime.world.model import build_spec
 from pianomime.world.scene_look import CAMERAS, LAMP_OFF, dress, key_colours
 
-FILM_SIZE = (1280, 544)
-"""Width and height of a film [pixels]: the keyboard is long."""
-
 _MAX_GEOMS = 1000
-# Smooth edges come from drawing larger and shrinking: with OpenGL in software, half as dear as
-# letting it take several samples a pixel.
-_FILM_OVERSIZE = 1.5
+_FPS = round(FRAME_RATE)
+# Edges are smoothed by rendering larger and shrinking: with OpenGL in software this costs half as
+# much as multisampling.
+_VIDEO_OVERSIZE = 1.5
 _PICTURE_OVERSIZE = 2.0
 _SILENCED = ("disable", "disabled", "off", "false", "0")
 _SHRINKING = av.video.reformatter.Interpolation.AREA
@@ -41,19 +43,30 @@ mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
 _PROBE_SECONDS = 60
 
 
-class RenderUnavailable(RuntimeError):  # noqa: N818 - it tells of the machine, not of a mistake
-    """This machine cannot draw; the message is one line that says what to install."""
+class RenderUnavailable(RuntimeError):  # noqa: N818 - a property of the machine, not an error
+    """This machine cannot render; the message is one line that says what to install."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Where a video is taken from, and its size."""
+
+    camera: str = "player"
+    """One of `pianomime.world.scene_look.CAMERAS`."""
+    size: tuple[int, int] = (1280, 544)
+    """Width and height [pixels], both even for H.264."""
 
 
 class Painter:
-    """Draws the world. Use it as a context manager, in the thread that made it.
+    """Renders the world. Use it as a context manager, in the thread that made it.
 
     Attributes:
-        width, height: size of its pictures [pixels].
+        width: of its pictures [pixels].
+        height: of its pictures [pixels].
     """
 
     def __init__(self, width: int, height: int, camera: str = "player") -> None:
-        """Set up a camera.
+        """Create an OpenGL context and a camera.
 
         Args:
             width: of the pictures [pixels].
@@ -61,8 +74,8 @@ class Painter:
             camera: one of `pianomime.world.scene_look.CAMERAS`.
 
         Raises:
-            RenderUnavailable: where there is no working OpenGL.
-            ValueError: for a camera or a size that does not exist.
+            RenderUnavailable: there is no working OpenGL.
+            ValueError: there is no such camera, or the size is not positive.
         """
         if camera not in CAMERAS:
             raise ValueError(f"camera must be one of {', '.join(CAMERAS)}, not {camera}")
@@ -78,15 +91,15 @@ class Painter:
         )
         self._resting = key_colours(np.zeros(KEYS, bool))
         self._scene = mujoco.MjvScene(self._model, _MAX_GEOMS)
-        # Mirror images double the work, and little here is polished.
+        # Reflections double the work, and few surfaces here would show them.
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self._option = mujoco.MjvOption()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._camera.fixedcamid = self._model.camera(camera).id
         self._rectangle = mujoco.MjrRect(0, 0, width, height)
-        # Not `mujoco.Renderer`: it settles on a backend when mujoco is imported, by MUJOCO_GL
-        # alone, and takes one that needs a display where that is not set.
+        # Not `mujoco.Renderer`: it chooses its backend when mujoco is imported, by MUJOCO_GL alone,
+        # and without that variable takes one that needs a display.
         self._gl = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
         self._gl.make_current()
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
@@ -104,12 +117,12 @@ class Painter:
         self.close()
 
     def paint(self, qpos: ArrayLike, colours: ArrayLike) -> NDArray[np.uint8]:
-        """Draw one frame.
+        """Render one frame.
 
         Args:
             qpos: (142,) positions: 88 keys, right hand 27, left hand 27 [rad, m].
-            colours: (88, 3) red, green and blue of each key, 0..1; the lamps behind keys that
-                differ from their colour at rest are lit in it.
+            colours: (88, 3) red, green and blue of each key, 0..1; the lamp behind a key whose
+                colour is not that of a key at rest is lit in the same colour.
 
         Returns:
             (height, width, 3) uint8.
@@ -136,7 +149,7 @@ class Painter:
         return picture[::-1]  # OpenGL counts rows from below
 
     def close(self) -> None:
-        """Give back what the graphics driver holds."""
+        """Free the OpenGL context."""
         self._gl.make_current()
         self._context.free()
         self._gl.free()
@@ -149,11 +162,11 @@ def render_frame(
     height: int = 816,
     camera: str = "player",
 ) -> NDArray[np.uint8]:
-    """Draw one picture.
+    """Render one picture.
 
     Args:
         qpos: (142,) positions: 88 keys, right hand 27, left hand 27 [rad, m].
-        pressed: (88,) bool, the keys to show as pressed.
+        pressed: (88,) bool, keys to show as pressed.
         width: of the picture [pixels].
         height: of the picture [pixels].
         camera: one of `pianomime.world.scene_look.CAMERAS`.
@@ -162,7 +175,8 @@ def render_frame(
         (height, width, 3) uint8.
 
     Raises:
-        RenderUnavailable: where there is no working OpenGL.
+        RenderUnavailable: there is no working OpenGL.
+        ValueError: there is no such camera, or the size is not positive.
     """
     with Painter(*_oversize((width, height), _PICTURE_OVERSIZE), camera) as painter:
         large = _video_frame(painter.paint(qpos, key_colours(pressed)))
@@ -175,75 +189,84 @@ def write_video(
     qpos: NDArray[np.float64],
     pressed: NDArray[np.bool_],
     audio: NDArray[np.float32] | None,
-    sample_rate: int = 48_000,
-    fps: int = 20,
-    progress: Callable[[int, int], None] | None = None,
+    sample_rate: int = SAMPLE_RATE,
     *,
     colours: NDArray[np.float32] | None = None,
-    size: tuple[int, int] = FILM_SIZE,
-    camera: str = "player",
+    view: View | None = None,
+    progress: Progress = no_progress,
 ) -> None:
-    """Film a performance: one picture a frame, and its sound, as MP4 (H.264, AAC).
+    """Render a performance at 20 pictures a second, with its sound, as MP4 (H.264, AAC).
 
-    The film ends with the last frame; sound that rings on is cut there. Frames are encoded as
-    they are drawn, so memory does not grow with the song.
+    The video ends with the last frame; sound that rings on is cut there. Frames are encoded as
+    they are rendered, so memory does not grow with the song.
 
     Args:
-        path: where to; appears only when complete.
+        path: the file; it appears only when complete.
         qpos: (T, 142) positions: 88 keys, right hand 27, left hand 27 [rad, m].
-        pressed: (T, 88) bool, the keys to show as pressed.
-        audio: (S, 2) sound, -1..1, or None for a silent film.
+        pressed: (T, 88) bool, keys to show as pressed.
+        audio: (S, 2) sound, -1..1, or None for a silent video.
         sample_rate: of the sound [Hz].
-        fps: frames a second: 20 shows a performance at its own speed.
-        progress: told (frames done, frames in all) after every frame.
-        colours: (T, 88, 3) colours of the keys, 0..1, instead of those that `pressed` gives.
-        size: width and height [pixels], both even.
-        camera: one of `pianomime.world.scene_look.CAMERAS`.
+        colours: (T, 88, 3) colour of each key, 0..1; None for those of `key_colours(pressed)`.
+        view: camera and size.
+        progress: called after every frame, in the phase "rendering".
 
     Raises:
-        RenderUnavailable: where there is no working OpenGL.
-        ValueError: if the shapes do not fit together.
+        RenderUnavailable: there is no working OpenGL.
+        ValueError: the shapes do not match, there are no frames, or the size is odd.
     """
+    view = view or View()
     frames = len(qpos)
     if not frames:
-        raise ValueError("a performance without frames cannot be filmed")
+        raise ValueError("a performance without frames cannot be rendered")
     if pressed.shape != (frames, KEYS):
         raise ValueError(f"pressed must be ({frames}, {KEYS}), not {pressed.shape}")
     if colours is not None and colours.shape != (frames, KEYS, 3):
         raise ValueError(f"colours must be ({frames}, {KEYS}, 3), not {colours.shape}")
     if audio is not None and (audio.ndim != 2 or audio.shape[1] != 2):
         raise ValueError(f"audio must be (S, 2), not {audio.shape}")
-    if size[0] % 2 or size[1] % 2:
-        raise ValueError(f"H.264 films have even sizes, not {size[0]}x{size[1]}")
+    if view.size[0] % 2 or view.size[1] % 2:
+        raise ValueError(f"H.264 needs an even size, not {view.size[0]}x{view.size[1]}")
     with (
-        Painter(*_oversize(size, _FILM_OVERSIZE), camera) as painter,
+        Painter(*_oversize(view.size, _VIDEO_OVERSIZE), view.camera) as painter,
         atomic(path) as temporary,
-        # An index at the front lets a browser start before it has the whole film.
-        av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as film,
+        _open_mp4(temporary, view.size, None if audio is None else sample_rate) as streams,
     ):
-        picture_stream: Any = film.add_stream("libx264", rate=fps)
-        picture_stream.width, picture_stream.height = size
-        picture_stream.pix_fmt = "yuv420p"
-        picture_stream.options = {"crf": "20", "preset": "veryfast"}
-        sound_stream: Any = None
-        if audio is not None:
-            sound_stream = film.add_stream("aac", rate=sample_rate, layout="stereo")
+        file, pictures, sound = streams
         for frame in range(frames):
             shown = key_colours(pressed[frame]) if colours is None else colours[frame]
             picture = _video_frame(painter.paint(qpos[frame], shown)).reformat(
-                *size, "yuv420p", interpolation=_SHRINKING
+                *view.size, "yuv420p", interpolation=_SHRINKING
             )
-            picture.pts, picture.time_base = frame, Fraction(1, fps)
-            film.mux(picture_stream.encode(picture))
+            picture.pts, picture.time_base = frame, Fraction(1, _FPS)
+            file.mux(pictures.encode(picture))
             if audio is not None:
-                # A frame's sound right after its picture keeps the two together in the file.
-                start, end = (round(at * sample_rate / fps) for at in (frame, frame + 1))
-                film.mux(sound_stream.encode(_sound(audio, start, end, sample_rate)))
-            if progress is not None:
-                progress(frame + 1, frames)
-        for stream in (picture_stream, sound_stream):
+                # Writing a frame's sound right after its picture interleaves them in the file.
+                start, end = (round(at * sample_rate / _FPS) for at in (frame, frame + 1))
+                file.mux(sound.encode(_sound(audio, start, end, sample_rate)))
+            progress("rendering", frame + 1, frames)
+
+
+@contextmanager
+def _open_mp4(
+    path: os.PathLike[str], size: tuple[int, int], sample_rate: int | None
+) -> Iterator[tuple[Any, Any, Any]]:
+    """Yields an open MP4 file, its stream of pictures, and that of sound or None.
+
+    Leaving the block writes what the encoders still hold.
+    """
+    # An index at the front lets a browser start before it has loaded the whole file.
+    with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as file:
+        pictures: Any = file.add_stream("libx264", rate=_FPS)
+        pictures.width, pictures.height = size
+        pictures.pix_fmt = "yuv420p"
+        pictures.options = {"crf": "20", "preset": "veryfast"}
+        sound: Any = None
+        if sample_rate is not None:
+            sound = file.add_stream("aac", rate=sample_rate, layout="stereo")
+        yield file, pictures, sound
+        for stream in (pictures, sound):
             if stream is not None:
-                film.mux(stream.encode(None))
+                file.mux(stream.encode(None))
 
 
 def _oversize(size: tuple[int, int], factor: float) -> tuple[int, int]:
@@ -256,7 +279,7 @@ def _video_frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
 
 
 def _sound(audio: NDArray[np.float32], start: int, end: int, sample_rate: int) -> av.AudioFrame:
-    """The samples start..end as a frame to encode, with silence after the end of the sound."""
+    """Samples start..end as a frame to encode, padded with silence after the end of the sound."""
     samples = np.zeros((2, end - start), np.float32)
     there = audio[start:end].T
     samples[:, : there.shape[1]] = there
@@ -267,31 +290,31 @@ def _sound(audio: NDArray[np.float32], start: int, end: int, sample_rate: int) -
 
 
 def _dressed_model(width: int, height: int) -> mujoco.MjModel:
-    """A model to draw, not to simulate: its key colours change from frame to frame."""
+    """A model of its own for rendering, because the colours of its keys change."""
     spec = build_spec()
     dress(spec)
-    # The buffer is allocated and cleared at this size, however small the picture.
+    # The buffer is allocated and cleared at this size, whatever the size of the picture.
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
     return spec.compile()
 
 
 @cache
 def _backend() -> str:
-    """The module of `mujoco` whose GLContext works here without a display.
+    """Name of the module of `mujoco` whose GLContext works here without a display.
 
     Raises:
-        RenderUnavailable: if none does.
+        RenderUnavailable: none does, or MUJOCO_GL switches rendering off.
     """
     wanted = os.environ.get("MUJOCO_GL", "").lower().strip()
     if wanted in _SILENCED:
-        raise RenderUnavailable(f"no film: rendering is switched off by MUJOCO_GL={wanted}")
+        raise RenderUnavailable(f"no video: rendering is switched off by MUJOCO_GL={wanted}")
     chosen = wanted in _candidates()
     for backend in (wanted,) if chosen else _candidates():
         if _works(backend):
             return backend
     if chosen:
         raise RenderUnavailable(
-            f"no film: MUJOCO_GL={wanted} does not work here; unset it, or install what it needs"
+            f"no video: MUJOCO_GL={wanted} does not work here; unset it, or install what it needs"
         )
     raise RenderUnavailable(_advice())
 
@@ -305,11 +328,11 @@ def _candidates() -> tuple[str, ...]:
 
 
 def _works(backend: str) -> bool:
-    """Try a backend in a process of its own: a broken driver can take its process down."""
+    """Try a backend in a process of its own, because a broken driver can crash its process."""
     try:
         probe = subprocess.run(
             [sys.executable, "-c", _PROBE, backend],
-            # A name it does not know makes mujoco itself fail to import.
+            # With an unknown name here, importing mujoco itself fails.
             env={**os.environ, "MUJOCO_GL": backend},
             stdin=subprocess.DEVNULL,
             capture_output=True,
@@ -324,7 +347,7 @@ def _works(backend: str) -> bool:
 def _advice() -> str:
     if sys.platform == "linux":
         return (
-            "no film: there is no working OpenGL here; on Debian or Ubuntu install it with "
+            "no video: there is no working OpenGL here; on Debian or Ubuntu install it with "
             "`apt-get install libegl1 libgl1`"
         )
-    return "no film: there is no working OpenGL here; install a graphics driver"
+    return "no video: there is no working OpenGL here; install a graphics driver"

@@ -1,7 +1,7 @@
-"""How the world looks: a stage, lights, cameras, materials and skins for the hands.
+"""Looks of the world: floor, lights, cameras, materials and skins for the hands.
 
-Nothing here touches the physics. The shapes that collide are boxes and capsules; where they look
-crude they are hidden behind skins without mass or contact, each the hull of a few spheres.
+Nothing here affects the physics. The shapes that collide are boxes and capsules; where they look
+crude they are hidden behind skins without mass or contact, each the convex hull of a few spheres.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pianomime.keyboard import BLACK, KEYS
 from pianomime.world.parameters import key_centres
 
 CAMERAS = ("player", "top", "side")
-"""Names of the cameras: over the player's shoulders, straight down, from the treble end."""
+"""Names of the cameras: over the player's shoulders, from straight above, from the treble end."""
 
 WHITE_KEY = (0.93, 0.92, 0.89)
 BLACK_KEY = (0.07, 0.07, 0.08)
@@ -25,7 +25,7 @@ PRESSED_KEY = (0.25, 0.78, 0.42)
 LAMP_OFF = (0.07, 0.07, 0.08)
 """Colours (red, green, blue), 0..1."""
 
-# The same two hues tell the hands apart in every picture of a performance.
+# Each hand has the same hue in every picture of a performance.
 _ACCENT = {"lh": (0.26, 0.52, 0.83, 1.0), "rh": (0.95, 0.55, 0.22, 1.0)}
 _HIDDEN_GROUP = 3
 _SKIN_GROUP = 1
@@ -78,14 +78,14 @@ _SKINS: dict[str, tuple[tuple[str, Sequence[_Sphere]], ...]] = {
 
 
 def dress(spec: mujoco.MjSpec) -> None:
-    """Give a spec of piano and hands its looks; its physics stays as it is.
+    """Add the looks to a spec of piano and hands, without changing its physics.
 
     Args:
-        spec: as `pianomime.world.model.build_spec` makes it, changed in place.
+        spec: as `pianomime.world.model.build_spec` makes it; changed in place.
     """
     _set_up_rendering(spec)
     _add_materials(spec)
-    _add_stage(spec)
+    _add_scenery(spec)
     _add_lamps(spec)
     _add_cameras(spec)
     for key in range(KEYS):
@@ -97,7 +97,11 @@ def dress(spec: mujoco.MjSpec) -> None:
 
 
 def key_colours(pressed: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Colours of the keys (..., 88, 3), 0..1, from which of them are pressed (..., 88)."""
+    """(..., 88, 3) Colour of each key, 0..1.
+
+    Args:
+        pressed: (..., 88) bool, keys to colour as pressed.
+    """
     resting = np.where(BLACK[:, None], BLACK_KEY, WHITE_KEY)
     # A black key in the full colour would look like a white one.
     down = np.where(BLACK[:, None], 0.7 * np.array(PRESSED_KEY), PRESSED_KEY)
@@ -128,7 +132,7 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         ("lacquer", (0.035, 0.035, 0.042), 0.6, 0.8),
         ("lamp", LAMP_OFF, 0.1, 0.1),
         ("felt", (0.36, 0.06, 0.09), 0.0, 0.0),
-        ("stage", (0.17, 0.18, 0.21), 0.05, 0.1),
+        ("floor", (0.17, 0.18, 0.21), 0.05, 0.1),
         ("shell", (0.80, 0.82, 0.85), 0.35, 0.5),
         ("joint", (0.15, 0.16, 0.19), 0.4, 0.5),
         ("accent_lh", _ACCENT["lh"], 0.3, 0.5),
@@ -137,7 +141,7 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         spec.add_material(name=name, rgba=(*rgb[:3], 1.0), specular=specular, shininess=shininess)
 
 
-def _add_stage(spec: mujoco.MjSpec) -> None:
+def _add_scenery(spec: mujoco.MjSpec) -> None:
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
@@ -158,11 +162,11 @@ def _add_stage(spec: mujoco.MjSpec) -> None:
         castshadow=True,
     )
     world.add_geom(
-        name="stage",
+        name="floor",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         pos=(0.0, 0.0, -0.05),
         size=(3.0, 3.0, 0.1),
-        material="stage",
+        material="floor",
         contype=0,
         conaffinity=0,
     )
@@ -188,7 +192,7 @@ def _add_stage(spec: mujoco.MjSpec) -> None:
 
 
 def _add_lamps(spec: mujoco.MjSpec) -> None:
-    """A lamp behind each key, which shows what is pressed where a hand hides the key itself."""
+    """Add a lamp behind each key, which shows that it is pressed where a hand hides it."""
     base = spec.geom("piano_base")
     front, top = base.pos[0] + base.size[0], base.pos[2] + base.size[2]
     for key, (_, y, _) in enumerate(key_centres()):
@@ -246,7 +250,7 @@ def _dress_body(spec: mujoco.MjSpec, body: mujoco.MjsBody, side: str, name: str)
 
 
 def _hull_points(spheres: Sequence[_Sphere]) -> NDArray[np.float64]:
-    """Points (N, 3) on some spheres; the hull that MuJoCo puts around them is their skin."""
+    """(N, 3) Points on the surface of spheres; MuJoCo makes their convex hull the skin."""
     polar, around = np.meshgrid(
         np.linspace(0.0, np.pi, 9), np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     )
@@ -257,7 +261,7 @@ def _hull_points(spheres: Sequence[_Sphere]) -> NDArray[np.float64]:
 
 
 def _look_at(pos: Sequence[float], target: Sequence[float]) -> NDArray[np.float64]:
-    """Quaternion (4,) of a camera at `pos` that looks at `target`, treble to its right."""
+    """(4,) Quaternion of a camera at `pos` that looks at `target`, with the treble to its right."""
     back = np.subtract(pos, target)
     back /= np.linalg.norm(back)
     # Seen from the treble end, the keyboard's y axis is no longer the horizontal of the picture.

@@ -13,55 +13,56 @@ from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import PARAMETERS, key_travel
 
 PRESSED_WITHIN: float = PARAMETERS["keyboard"]["pressed_within"]
-"""[rad] A key counts as pressed this close to its stop."""
+"""[rad] A key this close to its stop counts as pressed (paper, section 4: 0.5 degrees)."""
 
 _DOWN = 0.002
-"""[rad] A key turned by more than this is not at rest, whatever its velocity."""
+"""[rad] A key turned by more than this must not fall asleep."""
 _AWAKE = 2e-3
-"""[rad/s] Upward velocity above MuJoCo's threshold of sleep. A key under a finger loses it at once,
-and a free key is many times as fast within one step of the physics."""
+"""[rad/s] Upward velocity above MuJoCo's sleep threshold. A key under a finger loses it at once; a
+free key is many times as fast within one physics step."""
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""The parts of MuJoCo's state that a saved state holds."""
+"""Components of MuJoCo's state that `World.state` holds."""
 RESETS = [
     int(mujoco.mjtWarning.mjWARN_BADQPOS),
     int(mujoco.mjtWarning.mjWARN_BADQVEL),
     int(mujoco.mjtWarning.mjWARN_BADQACC),
 ]
-"""MuJoCo's warnings that come with an automatic reset."""
+"""MuJoCo's warnings that come with an automatic reset, that is, of unstable physics."""
 BLOW_UP = "the physics broke: hands opened above the keys where they were, keys up"
+"""Message of `PhysicsWarning`."""
 
 
 class PhysicsWarning(RuntimeWarning):
-    """The simulation broke and was put back."""
+    """The simulation became unstable and was put into its recovery pose."""
 
 
 class WorldState(ABC):
-    """What can be read from one world, or from B worlds: all shapes then begin with B."""
+    """State readout of one world, or of B worlds, whose shapes then begin with B."""
 
     @property
     def qpos(self) -> NDArray[np.float64]:
-        """(..., 142) positions: 88 keys, right hand 27, left hand 27 [rad, m]; a copy."""
+        """(..., 142) Positions: 88 keys, right hand 27, left hand 27 [rad, m]; a copy."""
         return self._positions().copy()
 
     @property
     def qpos_hands(self) -> NDArray[np.float64]:
-        """(..., 54) positions of the hands, right 27 then left 27 [rad, m]; a copy."""
+        """(..., 54) Positions of the hands, right 27 then left 27 [rad, m]; a copy."""
         return self._positions()[..., KEYS:].copy()
 
     @property
     def qvel_hands(self) -> NDArray[np.float64]:
-        """(..., 54) velocities of the hands, right 27 then left 27 [rad/s, m/s]; a copy."""
+        """(..., 54) Velocities of the hands, right 27 then left 27 [rad/s, m/s]; a copy."""
         return self._velocities()[..., KEYS:].copy()
 
     @property
     def key_state(self) -> NDArray[np.float64]:
-        """(..., 88) how far each key is down, 0..1."""
+        """(..., 88) How far each key is down: 0 at rest, 1 at its stop."""
         return key_state(self._positions())
 
     @property
     def pressed(self) -> NDArray[np.bool_]:
-        """(..., 88) the keys that sound: within 0.5 degrees of their stop."""
+        """(..., 88) bool: keys that sound, within 0.5 degrees of their stop."""
         return pressed(self._positions())
 
     def _keep_pressed_keys_awake(self) -> None:
@@ -76,21 +77,21 @@ class WorldState(ABC):
 
     @abstractmethod
     def _positions(self) -> NDArray[np.float64]:
-        """(..., 142) live."""
+        """(..., 142) Positions [rad, m]; a view of the simulation."""
 
     @abstractmethod
     def _velocities(self) -> NDArray[np.float64]:
-        """(..., 142) live."""
+        """(..., 142) Velocities [rad/s, m/s]; a view of the simulation."""
 
 
 def key_state(qpos: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far keys are down, 0..1: (..., 88) from positions (..., 142)."""
+    """(..., 88) How far each key is down, 0..1, from positions (..., 142)."""
     down: NDArray[np.float64] = np.clip(qpos[..., :KEYS] / key_travel(), 0.0, 1.0)
     return down
 
 
 def pressed(qpos: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which keys sound: (..., 88) bool from positions (..., 142)."""
+    """(..., 88) bool: keys that sound, from positions (..., 142)."""
     travel = key_travel()
     short = travel - np.clip(qpos[..., :KEYS], 0.0, travel)
     sounds: NDArray[np.bool_] = short <= PRESSED_WITHIN
@@ -98,10 +99,13 @@ def pressed(qpos: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def starting_positions(qpos: ArrayLike | None) -> NDArray[np.float64]:
-    """(..., 142) from positions of everything, of the hands (..., 54), or None for rest.
+    """(..., 142) Positions of keys and hands.
+
+    Args:
+        qpos: (..., 142), or (..., 54) of the hands with all keys up, or None for the rest pose.
 
     Raises:
-        ValueError: if `qpos` has another shape or is not finite.
+        ValueError: `qpos` has another shape or is not finite.
     """
     if qpos is None:
         return np.zeros(LAYOUT.qpos_size)
@@ -117,9 +121,13 @@ def starting_positions(qpos: ArrayLike | None) -> NDArray[np.float64]:
 
 
 def reset_pose_after_instability(qpos: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where hands are put when the physics broke: positions (..., 142) from those before."""
+    """(..., 142) Recovery pose: as at rest, but with the forearms where they are.
+
+    Args:
+        qpos: (..., 142) positions before the step in which the physics became unstable.
+    """
     opened = np.zeros_like(qpos)
-    along = [LAYOUT.joints[1].start, LAYOUT.joints[0].start]
+    along = [joints.start + LAYOUT.slide for joints in LAYOUT.joints]
     opened[..., along] = qpos[..., along]
     return opened
 
@@ -127,8 +135,13 @@ def reset_pose_after_instability(qpos: NDArray[np.float64]) -> NDArray[np.float6
 def finite(values: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """The values as an array.
 
+    Args:
+        values: what a caller gave.
+        name: of the argument, for the message.
+        shape: that it must have.
+
     Raises:
-        ValueError: if they have another shape or are not finite.
+        ValueError: `values` have another shape or are not finite.
     """
     array = np.asarray(values, float)
     if array.shape != shape:

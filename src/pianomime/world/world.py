@@ -1,4 +1,4 @@
-"""World: the simulated piano and hands, one 0.05 s control step at a time."""
+"""World: one simulation of piano and hands, stepped at 20 Hz."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.world.model import fingertip_sites, world_model
+from pianomime.world.model import SIDES, fingertip_sites, world_model
 from pianomime.world.parameters import SUBSTEPS
 from pianomime.world.state import (
     BLOW_UP,
@@ -23,37 +23,42 @@ from pianomime.world.state import (
 
 
 class World(WorldState):
-    """Piano, two hands and the pedal. Deterministic: same controls, same states, bit for bit.
+    """Piano, two hands and the pedal. The same controls give the same states, bit for bit.
 
     Attributes:
         model: the MuJoCo model, shared by all worlds; read-only.
         data: the MuJoCo state.
         pedal: whether the sustain pedal is down.
-        blow_ups: control steps since the last reset in which the physics broke. The forearms
-            are then put back along the keyboard to where they were before the step, with the
-            hands open in their rest pose above the keys and all keys up: fingers that were
-            wedged would break the physics again at once if they were left where they were.
-        quiet: whether that goes without a warning, as in a world that is only imagined.
+        blow_ups: number of control steps since the last reset in which the physics became
+            unstable. Such a step ends in a recovery pose: forearms along the keyboard where they
+            were before the step, hands open above the keys, all keys up. (Wedged fingers left in
+            place would become unstable again at once.)
+        quiet: whether unstable physics raises no `PhysicsWarning`.
     """
 
     def __init__(self, quiet: bool = False) -> None:
+        """Make a world at rest.
+
+        Args:
+            quiet: do not warn when the physics becomes unstable, as for look-ahead copies.
+        """
         self.quiet = quiet
         self.model = world_model()
         self.data = mujoco.MjData(self.model)
         self._tips = np.array(
-            [[self.model.site(name).id for name in fingertip_sites(side)] for side in ("lh", "rh")]
+            [[self.model.site(name).id for name in fingertip_sites(side)] for side in SIDES]
         )
         self.reset()
 
     def reset(self, qpos: ArrayLike | None = None) -> None:
-        """Put everything at rest.
+        """Set positions, with all velocities 0 and the pedal up.
 
         Args:
-            qpos: (142,) positions of keys and hands, or (54,) of the hands (right, left) with
-                all keys up; None for the rest pose, all joints 0 [rad, m].
+            qpos: (142,) positions of keys, right and left hand, or (54,) of the hands with all
+                keys up [rad, m]; None for the rest pose, in which all are 0.
 
         Raises:
-            ValueError: if `qpos` has another shape or is not finite.
+            ValueError: `qpos` has another shape or is not finite.
         """
         start = starting_positions(qpos)
         self.blow_ups = 0
@@ -61,7 +66,9 @@ class World(WorldState):
         self._put(start)
 
     def step(self, ctrl: ArrayLike, pedal: bool = False) -> None:
-        """Hold a control for one control step of 0.05 s.
+        """Simulate one control step of 0.05 s with a constant control.
+
+        Warns with `PhysicsWarning` when the physics becomes unstable, unless `quiet`.
 
         Args:
             ctrl: (46,) targets of the position actuators, right 23 then left 23 [rad, m];
@@ -69,11 +76,11 @@ class World(WorldState):
             pedal: whether the sustain pedal is down.
 
         Raises:
-            ValueError: if `ctrl` has another shape or is not finite.
+            ValueError: `ctrl` has another shape or is not finite.
         """
-        wanted = finite(ctrl, "ctrl", (self.model.nu,))
+        targets = finite(ctrl, "ctrl", (self.model.nu,))
         before = self.data.qpos.copy()
-        self.data.ctrl[:] = wanted
+        self.data.ctrl[:] = targets
         self.pedal = bool(pedal)
         self._keep_pressed_keys_awake()
         mujoco.mj_step(self.model, self.data, nstep=SUBSTEPS)
@@ -84,26 +91,26 @@ class World(WorldState):
             self._put(reset_pose_after_instability(before))
 
     def state(self) -> NDArray[np.float64]:
-        """(S,) the moment as numbers, for `set_state` of any World or WorldBatch.
+        """(S,) The simulation state, for `set_state` of any World or WorldBatch.
 
-        All that the physics goes on from, but for which keys sleep.
+        It is MuJoCo's full integration state; which bodies sleep is not part of it.
         """
         state = np.empty(mujoco.mj_stateSize(self.model, STATE))
         mujoco.mj_getState(self.model, self.data, state, STATE)
         return state
 
     def set_state(self, state: ArrayLike) -> None:
-        """Go to a moment that `state` gave; blow-ups are counted from here, the pedal is up.
+        """Restore a state; the pedal is then up and `blow_ups` is 0.
 
-        What follows is the same for every World and WorldBatch that goes there, bit for bit. It
-        may differ a little from what followed for the World that the state was taken from: keys
-        that slept there are awake here. `copy` does without that difference.
+        Every World and WorldBatch that restores one state continues alike, bit for bit. The World
+        that the state was taken from may continue slightly differently, because keys that slept
+        there are awake here; `copy` has no such difference.
 
         Args:
-            state: (S,).
+            state: (S,) as `state` returns it.
 
         Raises:
-            ValueError: if `state` has another shape or is not finite.
+            ValueError: `state` has another shape or is not finite.
         """
         given = finite(state, "state", (mujoco.mj_stateSize(self.model, STATE),))
         self.blow_ups = 0
@@ -112,7 +119,11 @@ class World(WorldState):
         mujoco.mj_setState(self.model, self.data, given, STATE)
 
     def copy(self, quiet: bool = False) -> World:
-        """Another world in the same moment: it goes on as this one does, bit for bit."""
+        """A world in the same state, which continues as this one does, bit for bit.
+
+        Args:
+            quiet: as of a new world.
+        """
         other = World(quiet)
         mujoco.mj_copyData(other.data, self.model, self.data)
         other.blow_ups, other.pedal = self.blow_ups, self.pedal
@@ -120,7 +131,7 @@ class World(WorldState):
 
     @property
     def fingertips(self) -> NDArray[np.float64]:
-        """(2, 6, 3) [m] hands (left, right); wrist, then thumb to little fingertip."""
+        """(2, 6, 3) World positions [m]; hands (left, right), points wrist, thumb .. little."""
         mujoco.mj_kinematics(self.model, self.data)
         tips: NDArray[np.float64] = self.data.site_xpos[self._tips]
         return tips
