@@ -4,6 +4,8 @@
     ./do play [SONG] [OPTIONS]   play a song (the bundled "ode-to-joy" if none is named)
     ./do test [PYTEST OPTIONS]   run the test suite
     ./do lint                    run ruff and mypy
+    ./do docs [serve]            build the documentation into build/site, or serve it while
+                                 you write
     ./do run COMMAND             run any command inside the environment, such as
                                  `./do run pianomime --help`
 
@@ -89,6 +91,19 @@ def bootstrap_pip():
         stop("this Python has neither ensurepip nor pip (on Debian: apt install python3-venv)")
 
 
+def build_docs(command):
+    """Build the site; the exit code, not 0 if there was a warning of any kind."""
+    # In its strict mode it does not count what is wrong with docstrings.
+    warnings = 0
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True
+    ) as build:
+        for line in build.stdout:
+            sys.stdout.write(line)
+            warnings += line.startswith(("griffe:", "mkdocstrings:"))
+    return build.returncode or min(warnings, 1)
+
+
 def main():
     """Run one of the commands in the docstring above."""
     use_new_enough_python()
@@ -107,6 +122,15 @@ def main():
         os.chdir(ROOT)
         checks = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"])
         sys.exit(max([subprocess.call([PYTHON, "-m"] + check) for check in checks]))
+    elif command == "docs" and rest in ([], ["serve"]):
+        set_up("docs")
+        os.chdir(ROOT)
+        if subprocess.call([PYTHON, os.path.join("docs", "make_reference.py")]) != 0:
+            stop("the reference could not be made; the lines above say why")
+        zensical = [PYTHON, "-m", "zensical"]
+        if rest:
+            run(zensical + ["serve"])
+        sys.exit(build_docs(zensical + ["build", "--clean", "--strict"]))
     elif command == "run" and rest:
         set_up("")
         os.environ["PATH"] = BIN + os.pathsep + os.environ["PATH"]
