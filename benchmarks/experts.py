@@ -21,12 +21,12 @@ from pathlib import Path
 from typing import Any
 
 import common
+from pianomime import load_player
 from pianomime.learn.expert.config import ExpertConfig, preset_config
 from pianomime.learn.expert.expert import train_expert
 from pianomime.learn.expert.many import find_experts_songs
-from pianomime.learn.runs.run import RunFolder
+from pianomime.learn.expert.expert_run import ExpertRun
 from pianomime.plan.demonstration import DemonstrationPlanner
-from pianomime.players.player import Player
 
 
 class TimeUpError(Exception):
@@ -40,7 +40,7 @@ def train(song: Path, out: Path, config: ExpertConfig, seconds: float, minutes: 
     began = time.monotonic()
     told = ""
 
-    def tell(done: int, total: int, remark: str) -> None:
+    def progress(phase: str, done: int, total: int, remark: str = "") -> None:
         nonlocal told
         now = used + (time.monotonic() - began) / 60
         if remark != told:
@@ -52,7 +52,7 @@ def train(song: Path, out: Path, config: ExpertConfig, seconds: float, minutes: 
     out.parent.mkdir(parents=True, exist_ok=True)
     try:
         if used < minutes:
-            train_expert(song, out, config, seconds=seconds, tell=tell)
+            train_expert(song, out, config, seconds=seconds, progress=progress)
     except TimeUpError:
         pass
     finally:
@@ -62,11 +62,11 @@ def train(song: Path, out: Path, config: ExpertConfig, seconds: float, minutes: 
 
 def row(song: Path, out: Path, minutes: float) -> dict[str, Any]:
     """What came out, beside the zero-shot player on the same excerpt."""
-    run = RunFolder.load(out)
+    run = ExpertRun.load(out)
     best = run.best()[1]
     zero_shot = out.with_name(out.name + ".zero-shot")
     if not zero_shot.exists():
-        player = replace(Player.from_name("zero-shot"), planner=DemonstrationPlanner(run.song))
+        player = replace(load_player("zero-shot"), planner=DemonstrationPlanner(run.song))
         zero_shot.write_text(str(player.play(run.song.score).metrics()["f1"]), "utf-8")
     return {
         "song": song.stem,
@@ -119,7 +119,7 @@ def main() -> None:
             )
             rows.append(row(song, out, minutes))
             if arguments.what == "curve":
-                for one in RunFolder.load(out).curve():
+                for one in ExpertRun.load(out).curve():
                     print(json.dumps(vars(one)))
     show(rows)
     if arguments.what == "seeds":

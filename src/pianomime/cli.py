@@ -8,6 +8,7 @@ reads on, as in `pianomime songs | head -1`, it ends with 141, as if by SIGPIPE,
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import importlib
 import inspect
 import io
@@ -18,7 +19,7 @@ import warnings
 from typing import NamedTuple, NoReturn, Protocol
 
 from pianomime import __version__
-from pianomime.errors import InputError
+from pianomime.errors import InputError, WorkFailed
 
 
 class Runnable(Protocol):
@@ -74,6 +75,9 @@ COMMANDS = {
     "diagnose": Command(
         "pianomime.commands.diagnose", "Diagnose", "find why notes were missed or wrong"
     ),
+    "players": Command(
+        "pianomime.commands.players", "Players", "list the players and their settings"
+    ),
     "songs": Command("pianomime.commands.songs", "Songs", "list the bundled songs"),
 }
 
@@ -95,9 +99,9 @@ def _help() -> str:
     )
 
 
-def _fail(message: object) -> NoReturn:
+def _fail(message: object, code: int = 2) -> NoReturn:
     print(f"pianomime: {message}", file=sys.stderr)
-    sys.exit(2)
+    sys.exit(code)
 
 
 def _one_line(error: OSError) -> str:
@@ -117,8 +121,8 @@ def main(arguments: list[str] | None = None) -> None:
         arguments: what follows `pianomime`; None for those of this process.
 
     Raises:
-        SystemExit: with code 2 for bad input, 130 for Ctrl-C, 141 when nobody reads what it prints,
-            0 after `--help` or `--version`.
+        SystemExit: with code 2 for bad input, 1 for work that failed, 130 for Ctrl-C, 141 when
+            nobody reads what it prints, 0 after `--help` or `--version`.
     """
     try:
         with warnings.catch_warnings():
@@ -131,6 +135,8 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(130)
     except InputError as error:
         _fail(error)
+    except WorkFailed as error:
+        _fail(error, 1)
     except BrokenPipeError:
         # Python flushes once more when it ends: let it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -157,6 +163,11 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
 
     module, config, _ = COMMANDS[name]
     kind = getattr(importlib.import_module(module), config)
+    settings: dict[str, str] | None = None
+    if "settings" in kind.__dataclass_fields__:
+        from pianomime.commands.player_settings import take_settings
+
+        arguments, settings = take_settings(arguments)
     # A command whose defaults depend on its arguments says what they are.
     known = {"default": kind.default(arguments)} if hasattr(kind, "default") else {}
     said = io.StringIO()
@@ -173,8 +184,19 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
     except SystemExit as stopped:
         if not stopped.code:
             raise
+        refused = _refused_by_config(stopped)
+        if refused is not None:
+            raise refused from None
         raise InputError(f"{_gist(said.getvalue())} (see pianomime {name} --help)") from None
-    return command
+    return command if settings is None else dataclasses.replace(command, settings=settings)
+
+
+def _refused_by_config(stopped: BaseException) -> InputError | None:
+    """The error of a config that refused its settings, which tyro has put into a box."""
+    error: BaseException | None = stopped
+    while error is not None and not isinstance(error, InputError):
+        error = error.__cause__ or error.__context__
+    return error
 
 
 def _gist(box: str) -> str:

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 if TYPE_CHECKING:
-    from pianomime.commands.progress import Tell
     from pianomime.learn.data.episode import Episode
+    from pianomime.progress import Progress
 
 
 @dataclass(frozen=True)
 class Collect:
-    """Make a data set for imitation of what experts play.
+    """Make a data set for imitation from what trained experts play.
 
-    OUT is a zarr 3 group of documented arrays: state, goal, fingertips, prior, residual and action
-    of every frame, one episode after the other.
+    OUT is a zarr 3 group of documented arrays: state, goal, fingertips, base control, residual and
+    action of every frame, one episode after the other.
 
     Examples:
       pianomime collect out/experts-FOLDER-best -o experts.zarr
@@ -28,11 +28,11 @@ class Collect:
     """
 
     runs: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="RUN...")]
-    """Folders of runs, folders of such folders, or .npz files of PianoMime's published experts."""
+    """Run folders of experts, folders of such, or .npz files of PianoMime's published experts."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/experts.zarr")
-    """The data set; one that is there is replaced."""
+    """The data set; an existing one is replaced."""
     demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The demonstrations that published experts were trained on, an .npz file."""
+    """For published experts: the demonstrations that they were trained on, an .npz file."""
 
     def run(self) -> None:
         """Collect.
@@ -44,16 +44,17 @@ class Collect:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
-        with extra("train"), bars() as tell:
-            from pianomime.learn.data.trajectories import write_expert_data
+        with extra("train"), bars() as progress:
+            from pianomime.learn.data.trajectories import write_trajectories
 
-            number = write_expert_data(self.out, self._episodes(tell))
+            number = write_trajectories(self.out, self._episodes(progress))
         print(f"saved {number} episodes: {self.out}")
 
-    def _episodes(self, tell: Tell) -> Iterator[Episode]:
+    def _episodes(self, progress: Progress) -> Iterator[Episode]:
         from pianomime.errors import InputError
-        from pianomime.learn.data.episode import play_episode, published_episodes
-        from pianomime.learn.runs.run import RunFolder, find_runs
+        from pianomime.learn.data.episode import play_episode
+        from pianomime.learn.data.published import published_episodes
+        from pianomime.learn.expert.expert_run import ExpertRun, find_expert_runs
 
         if not self.runs:
             raise InputError("no runs to collect")
@@ -64,9 +65,9 @@ class Collect:
                 published = published_episodes(path, self.demonstrations)
                 for done, (episode, total) in enumerate(published, 1):
                     yield episode
-                    tell(path.name, done, total)
+                    progress(path.name, done, total)
                 continue
-            found = find_runs(path)
+            found = find_expert_runs(path)
             for done, folder in enumerate(found, 1):
-                yield play_episode(RunFolder.load(folder))
-                tell("playing", done, len(found))
+                yield play_episode(ExpertRun.load(folder))
+                progress("playing", done, len(found))

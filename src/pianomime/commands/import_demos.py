@@ -43,9 +43,9 @@ class ImportDemos:
 
         out = self.out or Path("out", f"demos-{self.source.stem}")
         number = 0
-        with staged(out, ()) as folder, bars() as tell:
+        with staged(out, ()) as folder, bars() as progress:
             for demonstration, total in read_published(self.source, self.clips):
                 demonstration.save(folder / f"{demonstration.score.title}.npz")
                 number += 1
-                tell("importing", number, total)
+                progress("importing", number, total)
         print(f"saved {number} demonstrations: {out}")

@@ -70,10 +70,10 @@ class Retarget:
         config = RetargetConfig(self.midi, self.points, self.offset, self.hand_model, self.align)
         # The folder first: that it cannot be written shows before the work, not after. Whoever
         # interrupts this finds no picture of a demonstration that is not there.
-        with staged(out.parent, ours) as folder, bars() as tell:
-            made = retarget(self.video, config, tell)
+        with staged(out.parent, ours) as folder, bars() as progress:
+            made = retarget(self.video, config, progress)
             if self.overlay:
-                write_overlay(made, folder / overlay.name, tell)
+                write_overlay(made, folder / overlay.name, progress)
             write_summary(made, folder / page.name)
             made.demonstration.save(folder / out.name)
         quality = made.demonstration.quality

@@ -8,53 +8,57 @@ from typing import Annotated
 
 import tyro
 
-from pianomime.commands.named import named
+from pianomime.commands.named import option_value
 from pianomime.errors import InputError
 from pianomime.learn.imitation.config import POLICIES, PolicyConfig, PolicyName, Size, policy_config
 
 
 @dataclass(frozen=True)
 class Train:
-    """Train one network of a player that plays every song, by imitation.
+    """Train one policy of a generalist, a player that plays every song, by imitation.
 
-    A player of two stages needs two, and those that see goals by their codes need a goal encoder
-    first (`pianomime train-goal`). OUT then holds STAGE.onnx, and in the folder STAGE the training.
-    Started again it goes on where it was. Set PIANOMIME_WEIGHTS=OUT to play with what is in OUT.
+    Two-stage players need two policies, a high-level one (goals to fingertips) and a low-level one
+    (fingertips to controls). Policies with goal codes need a goal encoder first (`pianomime
+    train-goal`). OUT then holds POLICY.onnx, and the folder POLICY the training, with its curves
+    for TensorBoard. The same command again resumes a training that was stopped. Set
+    PIANOMIME_WEIGHTS=OUT to play with the policies in OUT.
 
     Examples:
-      pianomime train high-diff --experts lessons.zarr
-      pianomime train low-diff --experts lessons.zarr
-      pianomime train low-diff-res --experts lessons.zarr more.zarr --fit.steps 50000
+      pianomime train high-diff --experts dagger.zarr
+      pianomime train low-diff --experts dagger.zarr
+      pianomime train low-diff-res --experts dagger.zarr more.zarr --trainer.steps 50000
       pianomime train high-diff --size paper --demonstrations demos -o out/paper
     """
 
-    stage: Annotated[tyro.conf.Positional[PolicyName], tyro.conf.arg(metavar="STAGE")]
-    """Which network."""
+    policy: Annotated[tyro.conf.Positional[PolicyName], tyro.conf.arg(metavar="POLICY")]
+    """Name of the policy."""
     demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
-    """What high levels learn from instead: a folder of demonstrations, or published ones (.npz)."""
+    """For high levels, instead of --experts: a folder of demonstrations, or the published ones
+    (.npz)."""
     experts: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DATA...")] = ()
     """Data sets made by `pianomime collect-dagger` or `pianomime collect`."""
     goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """The goal encoder; OUT/goal if not given."""
+    """Folder of the goal encoder; OUT/goal if not given."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
-    """Folder for the results, shared by all stages."""
+    """Folder for the results, shared by all policies."""
     size: Size = "small"
-    """Of the network: one for two cores, or the paper's for a GPU; settings below change it."""
+    """Size of the network: for two CPU cores, or the paper's for a GPU; the settings below override
+    it."""
     config: Annotated[PolicyConfig, tyro.conf.arg(name="")] = field(
         default_factory=lambda: policy_config("high-diff")
     )
-    """Everything else."""
+    """Settings of the policy and its training."""
 
     @classmethod
     def default(cls, arguments: list[str]) -> Train:
-        """What holds for arguments that are not given: that is for stage and size to say."""
-        # Not what an option is given, such as a folder of that name.
+        """The defaults of settings, which depend on the policy and the size that are named."""
+        # Not the value of an option, such as a folder of that name.
         after = zip(["", *arguments], arguments, strict=False)
         alone = {argument for before, argument in after if not before.startswith("-")}
-        stage = next((name for name in POLICIES if name in alone), POLICIES[0])
+        policy = next((name for name in POLICIES if name in alone), POLICIES[0])
         # Any other is refused when the command line is parsed.
-        size: Size = "paper" if named("--size", arguments, "small") == "paper" else "small"
-        return cls(stage=tyro.MISSING, config=policy_config(stage, size))
+        size: Size = "paper" if option_value("--size", arguments, "small") == "paper" else "small"
+        return cls(policy=tyro.MISSING, config=policy_config(policy, size))
 
     def run(self) -> None:
         """Train.
@@ -66,23 +70,23 @@ class Train:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
-        if _kind(self.config) != _kind(policy_config(self.stage)):
-            raise InputError(f"name the stage first: pianomime train {self.stage} ...")
-        with extra("train"), bars() as tell:
+        if _kind(self.config) != _kind(policy_config(self.policy)):
+            raise InputError(f"name the policy first: pianomime train {self.policy} ...")
+        with extra("train"), bars() as progress:
             from pianomime.learn.imitation.training import train_policy
 
-            made = train_policy(
-                self.stage,
+            file = train_policy(
+                self.policy,
                 self.config,
                 self.out,
                 self.demonstrations,
                 self.experts,
                 self.goal or self.out / "goal",
-                lambda done, total, remark: tell(self.stage, done, total, remark),
+                progress,
             )
-        print(f"saved: {made}")
+        print(f"saved: {file}")
 
 
 def _kind(config: PolicyConfig) -> tuple[str, str, str, bool]:
-    """What a stage's name stands for: defaults are taken by it, before arguments are parsed."""
-    return config.level, config.network, config.code, config.prior
+    """What a policy's name stands for: it decides the defaults before arguments are parsed."""
+    return config.level, config.network, config.goal_encoding, config.residual

@@ -60,14 +60,14 @@ class TrainExpert:
         with extra("train"):
             from pianomime.learn.expert.expert import train_expert
         out = self.out or Path("out", f"expert-{Path(self.song).stem}-{self.preset}")
-        with bars() as tell, extra("train"):
+        with bars() as progress, extra("train"):
             run = train_expert(
                 self.song,
                 out,
                 self.config,
                 self.start,
                 self.seconds,
-                tell=lambda done, total, remark: tell("training", done, total, remark),
+                progress=progress,
             )
         best = run.best()[1]
         print(f"F1 {best['f1']:.3f} after {best['steps']} steps")

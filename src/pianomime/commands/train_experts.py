@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -64,7 +63,7 @@ class TrainExperts:
         with extra("train"):
             from pianomime.learn.expert.many import experts_table, train_experts
         out = self.out or Path("out", f"experts-{self.folder.name}-{self.preset}")
-        with bars() as tell, extra("train" if self.ray is None else "scale"):
+        with bars() as progress, extra("train" if self.ray is None else "scale"):
             rows = train_experts(
                 self.folder,
                 out,
@@ -73,11 +72,7 @@ class TrainExperts:
                 self.seconds,
                 self.jobs,
                 self.ray,
-                lambda done, total, f1: tell("songs", done, total, _remark(f1)),
+                progress,
             )
         print(experts_table(rows))
         print(f"saved: {out / 'experts.json'}")
-
-
-def _remark(f1: float) -> str:
-    return "" if math.isnan(f1) else f"mean F1 {f1:.3f}"

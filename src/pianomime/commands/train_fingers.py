@@ -13,30 +13,30 @@ from pianomime.learn.fingers.config import FingersConfig
 
 @dataclass(frozen=True)
 class TrainFingers:
-    """Train what all ten fingers add to the zero-shot player, by reinforcement learning.
+    """Train the finger residual, which all fingers add to the zero-shot player, by PPO.
 
-    Many songs are played side by side, each as the zero-shot player would; every finger learns from
-    what becomes of its own keys. Some songs are kept to measure on. OUT then holds fingers.onnx,
-    and the folder fingers the training. Started again it goes on where it was. Set
-    PIANOMIME_WEIGHTS=OUT to play with it.
+    Many songs are played side by side, on the zero-shot plan and the dynamic tracker. All fingers
+    share one policy, and each is rewarded for its own keys. Some songs are kept for validation. OUT
+    then holds fingers.onnx, and the folder fingers the training. The same command again resumes a
+    training that was stopped. Set PIANOMIME_WEIGHTS=OUT to play with the policy.
 
     Examples:
       pianomime train-fingers MIDI_FOLDER
-      pianomime train-fingers FOLDER FOLDER --frames 1000000
+      pianomime train-fingers FOLDER FOLDER --total-steps 1000000
       PIANOMIME_WEIGHTS=out/generalist pianomime play SONG.mid --player fingers
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER...")]
-    """Of MIDI files, also further down."""
+    """Folders of MIDI files, searched recursively."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
     """Folder for the result."""
     threads: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Threads of the physics and of the network; one a core if 0."""
+    """Threads of the physics and of the network; 0 for one a core."""
     config: Annotated[FingersConfig, tyro.conf.arg(name="")] = field(default_factory=FingersConfig)
-    """Everything else."""
+    """Settings of the training."""
 
     def run(self) -> None:
-        """Train and print how good it is.
+        """Train, and print the F1 on the validation songs.
 
         Raises:
             InputError: there are too few songs, or OUT holds another training.
@@ -45,19 +45,14 @@ class TrainFingers:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
-        with extra("train"), bars() as tell:
+        with extra("train"), bars() as progress:
             from pianomime.learn.fingers.training import train_fingers
 
-            made, measured = train_fingers(
-                self.folders,
-                self.out,
-                self.config,
-                self.threads,
-                lambda done, total, remark: tell("training", done, total, remark),
-                lambda done, total, remark: tell("planning", done, total, remark),
+            file, metrics = train_fingers(
+                self.folders, self.out, self.config, self.threads, progress
             )
         print(
-            f"F1 of songs that it did not learn from: {measured['unseen/f1']:.4f}, "
-            f"without it {measured['unseen/f1_without']:.4f}"
+            f"F1 on validation songs: {metrics['validation/f1']:.4f}, "
+            f"without the residual {metrics['validation/f1_base']:.4f}"
         )
-        print(f"saved: {made}")
+        print(f"saved: {file}")

@@ -13,26 +13,26 @@ from pianomime.learn.goal.config import GoalConfig
 
 @dataclass(frozen=True)
 class TrainGoal:
-    """Train the goal autoencoder: from the keys that should be down to 16 numbers.
+    """Train the goal autoencoder: the keys that should be down as a code of 16 numbers.
 
-    Goals that are near each other on the keyboard get codes that are near each other, which is what
-    most networks of `pianomime train` are told of a goal. Some of the files are kept to measure on.
-    Started again with the same OUT it goes on where it was. OUT/codes.png shows the codes.
+    Goals that are close on the keyboard get similar codes, which most policies of `pianomime train`
+    observe instead of the keys. Some of the files are kept for validation. OUT/codes.png shows the
+    codes. The same command again resumes a training that was stopped.
 
     Examples:
       pianomime train-goal MIDI_FOLDER
-      pianomime train-goal FOLDER FOLDER -o out/generalist/goal --fit.steps 20000
+      pianomime train-goal FOLDER FOLDER -o out/generalist/goal --trainer.steps 20000
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER...")]
-    """Of MIDI files, also further down."""
+    """Folders of MIDI files, searched recursively."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist/goal")
     """Folder for the result."""
     config: Annotated[GoalConfig, tyro.conf.arg(name="")] = field(default_factory=GoalConfig)
-    """Everything else."""
+    """Settings of the training."""
 
     def run(self) -> None:
-        """Train and print how good it is.
+        """Train, and print the metrics.
 
         Raises:
             InputError: there are no goals, or OUT holds another training.
@@ -41,23 +41,18 @@ class TrainGoal:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
-        with extra("train"), bars() as tell:
+        with extra("train"), bars() as progress:
             from pianomime.learn.goal.training import train_goal
 
-            figures, goals = train_goal(
-                self.folders,
-                self.out,
-                self.config,
-                lambda done, total, remark: tell("training", done, total, remark),
-                lambda done, total, remark: tell("reading", done, total, remark),
-            )
+            metrics, goals = train_goal(self.folders, self.out, self.config, progress)
         print(
-            f"{len(goals.train)} goals of {goals.files} files learned, measured on "
-            f"{len(goals.unseen)} of {goals.unseen_files} others ({goals.skipped} not readable)"
+            f"trained on {len(goals.train)} goals of {goals.files} files, validated on "
+            f"{len(goals.validation)} of {goals.validation_files} others "
+            f"({goals.skipped} not readable)"
         )
-        print(f"distance to the nearest key: off by {figures.error_mm:.1f} mm")
+        print(f"mean error of the decoded distance to the nearest key: {metrics.error_mm:.1f} mm")
         print(
-            f"near goals, near codes: rank correlation {figures.near_codes:.3f} "
-            f"(of the keys themselves: {figures.near_keys:.3f})"
+            "rank correlation of distances between codes and between goals: "
+            f"{metrics.code_correlation:.3f} (of the keys themselves: {metrics.key_correlation:.3f})"
         )
         print(f"saved: {self.out}")

@@ -15,9 +15,10 @@ from pianomime.learn.sac.config import SacConfig
 class TrainSac:
     """Train one policy for all songs by reinforcement learning, without demonstrations.
 
-    This is the paper's multi-task SAC, a baseline. OUT then holds multi-task-sac.onnx. Set
-    PIANOMIME_WEIGHTS=OUT to play with it. Started again it goes on from its last checkpoint, of
-    which there is one every 50,000 frames, of up to a GB.
+    This is the paper's multi-task SAC, a baseline. OUT then holds multi-task-sac.onnx, and the
+    folder multi-task-sac the training. The same command again resumes a training that was stopped,
+    from its last checkpoint; there is one every 50,000 control steps, of up to 1 GB. Set
+    PIANOMIME_WEIGHTS=OUT to play with the policy.
 
     Examples:
       pianomime train-sac MIDI_FOLDER
@@ -25,13 +26,13 @@ class TrainSac:
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER...")]
-    """Of MIDI files, also further down."""
+    """Folders of MIDI files, searched recursively."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
     """Folder for the result."""
     threads: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Threads of the physics; one a core if 0."""
+    """Threads of the physics; 0 for one a core."""
     config: Annotated[SacConfig, tyro.conf.arg(name="")] = field(default_factory=SacConfig)
-    """Everything else."""
+    """Settings of the training."""
 
     def run(self) -> None:
         """Train.
@@ -43,14 +44,8 @@ class TrainSac:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
-        with extra("train"), bars() as tell:
+        with extra("train"), bars() as progress:
             from pianomime.learn.sac.training import train_sac
 
-            made = train_sac(
-                self.folders,
-                self.out,
-                self.config,
-                self.threads,
-                lambda done, total, remark: tell("training", done, total, remark),
-            )
-        print(f"saved: {made}")
+            file = train_sac(self.folders, self.out, self.config, self.threads, progress)
+        print(f"saved: {file}")

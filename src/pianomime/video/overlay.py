@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -12,19 +11,18 @@ import numpy as np
 
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, NO_KEY
+from pianomime.progress import Progress, no_progress
 from pianomime.video.drawing import Drawing
 from pianomime.video.retarget import Retargeted
 
 
-def write_overlay(
-    made: Retargeted, path: Path, tell: Callable[[str, int, int], None] | None = None
-) -> None:
+def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress) -> None:
     """Film the landmarks, the key grid, the pressed keys and the fingering, 20 frames a second.
 
     Args:
         made: what was made of a video.
         path: MP4 file; appears only when complete.
-        tell: told the stage, the frames done and the frames in all.
+        progress: told the frames done and in all.
     """
     drawing = Drawing(made.plane)
     finger_key = made.demonstration.plan.finger_key
@@ -54,6 +52,5 @@ def write_overlay(
             picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(drawn), format="rgb24")
             picture.pts, picture.time_base = number, Fraction(1, round(FRAME_RATE))
             film.mux(stream.encode(picture))
-            if tell is not None:
-                tell("overlay", number + 1, len(tracks))
+            progress("overlay", number + 1, len(tracks))
         film.mux(stream.encode(None))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -18,6 +17,7 @@ from pianomime.music import Score
 from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import LEFT, RIGHT
 from pianomime.plan.demonstration import Demonstration, on_grid
+from pianomime.progress import Progress, no_progress
 from pianomime.video.align import Rule, align, raised
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
@@ -34,8 +34,6 @@ from pianomime.video.notes.offset import Offset, estimate_offset
 from pianomime.video.notes.reading import read_notes
 from pianomime.video.parallax import take_back_parallax
 from pianomime.video.stretches import stretches
-
-Tell = Callable[[str, int, int], None]
 
 _BACKGROUND_FRAMES = 25
 _MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
@@ -84,20 +82,19 @@ class Retargeted:
 
 
 def retarget(
-    video: Path, config: RetargetConfig | None = None, tell: Tell | None = None
+    video: Path, config: RetargetConfig | None = None, progress: Progress = no_progress
 ) -> Retargeted:
     """Make a demonstration of a video.
 
     Args:
         video: any video of a keyboard from above.
         config: what else is known.
-        tell: told the stage, the steps done and the steps in all (0: unknown).
+        progress: told the phase, and the frames done and in all.
 
     Raises:
         InputError: a file is not what it should be, or the video shows no keyboard, or no hands.
     """
     config = config or RetargetConfig()
-    tell = tell or (lambda stage, done, total: None)
     # What can be wrong is looked at before what takes long.
     if config.offset is not None and not abs(config.offset) <= MAX_SECONDS:
         raise InputError(f"--offset must be a time in the video, not {config.offset:g} s")
@@ -108,7 +105,7 @@ def retarget(
         raise InputError(f"{video}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
     model = find_hand_model(config.hand_model)
     remarks: list[str] = []
-    tell("keyboard", 0, 0)
+    progress("keyboard", 0, 0)
     background = _background(film)
     if named is None:
         ways = find_keyboards(background)
@@ -127,8 +124,8 @@ def retarget(
     with ExitStack() as records:
         lights = [records.enter_context(LightRecord(len(ZONES))) for _ in planes]
         readers = [KeyLight(plane, size) for plane in planes]
-        sightings = _watch(film, readers, lights, model, tell)
-        tell("notes", 0, 0)
+        sightings = _watch(film, readers, lights, model, progress)
+        progress("notes", 0, 0)
         best, tracks, offset = _best_way(sightings, size, planes, lights, score, config.offset)
         del sightings  # what is no longer needed goes: hours of it take much memory
         plane, light = planes[best], lights[best]
@@ -196,7 +193,7 @@ def _background(film: Film) -> NDArray[np.float32]:
 
 
 def _watch(
-    film: Film, readers: list[KeyLight], lights: list[LightRecord], model: Path, tell: Tell
+    film: Film, readers: list[KeyLight], lights: list[LightRecord], model: Path, progress: Progress
 ) -> Sightings:
     """In one pass over the film find the hands in each frame, and fill the records."""
     sightings = Sightings()
@@ -206,7 +203,7 @@ def _watch(
             sightings.append(detector.detect(frame.picture, round(number * 1000 / FRAME_RATE)))
             for reader, light in zip(readers, lights, strict=True):
                 light.append(reader.read(frame.picture))
-            tell("hands", number + 1, max(total, number + 1))
+            progress("hands", number + 1, max(total, number + 1))
     return sightings
 
 

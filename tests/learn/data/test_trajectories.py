@@ -16,7 +16,7 @@ from pianomime.learn.data.episode import COLUMNS, Episode, published_episodes, w
 from pianomime.learn.data.trajectories import ExpertData, write_expert_data
 from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert import load_expert, train_expert
-from pianomime.learn.runs.run import find_runs
+from pianomime.learn.expert.expert_run import find_expert_runs
 from pianomime.plan.demonstration import Demonstration
 from pianomime.world import World
 from pianomime.world.parameters import key_travel
@@ -29,7 +29,7 @@ def runs(
     """A run of each method in one folder, and one that was not begun."""
     dataclasses.replace(two_notes, song=42, split="test").save(tmp_path / "demo.npz")
     for name, config in (("a", small_ppo), ("b", small_search)):
-        short = dataclasses.replace(config, steps=128)
+        short = dataclasses.replace(config, total_steps=128)
         train_expert(tmp_path / "demo.npz", tmp_path / "runs" / name, short, threads=1)
     return tmp_path / "runs"
 
@@ -39,7 +39,7 @@ def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
     Collect((runs,), out).run()
     data = ExpertData.open(out)
     assert len(data) == 2
-    for number, folder in enumerate(find_runs(runs)):
+    for number, folder in enumerate(find_expert_runs(runs)):
         player, run = load_expert(folder)
         performance = player.play(run.song.score)
         episode = data.episode(number)
@@ -79,7 +79,7 @@ def test_what_fails_leaves_the_older_data(
 ) -> None:
     out = tmp_path / "experts.zarr"
     Collect((runs,), out).run()
-    (runs / "b" / "expert.safetensors").write_bytes(b"cut")
+    (runs / "b" / "result.safetensors").write_bytes(b"cut")
     with pytest.raises(InputError, match="damaged"):
         Collect((runs,), out).run()
     assert len(ExpertData.open(out)) == 2

@@ -16,9 +16,10 @@ from typing import Any
 import pytest
 
 from pianomime.errors import InputError
-from pianomime.learn.expert.config import ExpertConfig, to_json
+from pianomime.learn.expert.config import ExpertConfig
+from pianomime.learn.expert.expert_run import ExpertRun
 from pianomime.learn.expert.many import experts_table, find_experts_songs, train_experts
-from pianomime.learn.runs.run import RunFolder
+from pianomime.learn.runs.config_json import to_json
 from pianomime.plan.demonstration import Demonstration
 
 
@@ -37,14 +38,17 @@ def test_failed_songs_are_rows_and_finished_ones_are_kept(
     songs: Path, tmp_path: Path, small_search: ExpertConfig
 ) -> None:
     out = tmp_path / "out"
-    told: list[tuple[int, int]] = []
-    rows = train_experts(
-        songs, out, small_search, jobs=2, progress=lambda done, total, _: told.append((done, total))
-    )
+    reported: list[tuple[str, int, int, str]] = []
+
+    def progress(phase: str, done: int, total: int, remark: str = "") -> None:
+        reported.append((phase, done, total, remark))
+
+    rows = train_experts(songs, out, small_search, jobs=2, progress=progress)
     assert [row["song"] for row in rows] == ["a", "b", "broken", "more-a"]
     assert [bool(row.get("error")) for row in rows] == [False, False, True, False]
-    assert told[0] == (0, 4)
-    assert told[-1] == (4, 4)
+    assert reported[0] == ("songs", 0, 4, "")
+    mean = sum(row.get("f1", 0.0) for row in rows) / 3
+    assert reported[-1] == ("songs", 4, 4, f"mean F1 {mean:.3f}")
     assert json.loads((out / "experts.json").read_text()) == rows
     assert (out / "experts.md").read_text() == experts_table(rows)
     assert "failed" in experts_table(rows)
@@ -94,7 +98,7 @@ def test_a_cluster_that_loses_a_node_goes_on(
     from ray.cluster_utils import Cluster
 
     monkeypatch.setenv("RAY_ENABLE_UV_RUN_RUNTIME_ENV", "0")
-    long = dataclasses.replace(small_search, steps=4_000)
+    long = dataclasses.replace(small_search, total_steps=4_000)
     out = tmp_path / "out"
     # The first node coordinates; all work is on two others.
     quick = {"health_check_timeout_ms": 1000, "health_check_period_ms": 500}
@@ -129,8 +133,8 @@ def test_a_cluster_that_loses_a_node_goes_on(
         cluster.shutdown()
     assert [len(runs) for runs in busy] == [1]
     assert [row["song"] for row in rows if "error" in row] == ["broken"]
-    curves = [RunFolder.load(out / row["song"]).curve() for row in rows if "error" not in row]
-    assert all(curve[-1].steps >= long.steps for curve in curves)
+    curves = [ExpertRun.load(out / row["song"]).curve() for row in rows if "error" not in row]
+    assert all(curve[-1].steps >= long.total_steps for curve in curves)
     # The same song with the same seed: those that were interrupted have the same curve as the rest.
     assert curves[0] == curves[1] == curves[2]
 
@@ -163,53 +167,51 @@ def _processes_below(parent: int) -> list[int]:
 
 
 def test_a_kill_leaves_no_process(songs: Path, tmp_path: Path, small_search: ExpertConfig) -> None:
-    endless = dataclasses.replace(small_search, steps=10_000_000)
+    endless = dataclasses.replace(small_search, total_steps=10_000_000)
     out = tmp_path / "out"
     (songs / "broken.mid").unlink()
     script = (
         "import json, sys\n"
         "from pathlib import Path\n"
-        "from pianomime.learn.expert.config import ExpertConfig, from_json\n"
+        "from pianomime.learn.expert.config import ExpertConfig\n"
         "from pianomime.learn.expert.many import train_experts\n"
+        "from pianomime.learn.runs.config_json import from_json\n"
         "config = from_json(ExpertConfig, json.loads(sys.argv[3]))\n"
         "train_experts(Path(sys.argv[1]), Path(sys.argv[2]), config, jobs=2)\n"
     )
-    told = json.dumps(to_json(endless))
-    asking = subprocess.Popen([sys.executable, "-c", script, str(songs), str(out), told])
+    given = json.dumps(to_json(endless))
+    asking = subprocess.Popen([sys.executable, "-c", script, str(songs), str(out), given])
     deadline = time.monotonic() + 60
     while len(list(out.glob("*/curve.json"))) < 2 and time.monotonic() < deadline:
         assert asking.poll() is None
         time.sleep(0.05)
-    assert len(_processes_about(out)) == 3
+    workers = _processes_below(asking.pid)
+    assert len(workers) == 2
     asking.kill()
     asking.wait()
     deadline = time.monotonic() + 30
-    while _processes_about(out) and time.monotonic() < deadline:
+    while any(map(_works, workers)) and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert _processes_about(out) == []
+    assert not any(map(_works, workers))
 
 
 def test_stopping_leaves_no_process(
     songs: Path, tmp_path: Path, small_search: ExpertConfig
 ) -> None:
-    endless = dataclasses.replace(small_search, steps=10_000_000)
+    endless = dataclasses.replace(small_search, total_steps=10_000_000)
 
-    def stop(done: int, total: int, f1: float) -> None:
+    def stop(phase: str, done: int, total: int, remark: str = "") -> None:
         if done:  # the broken one
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         train_experts(songs, tmp_path / "out", endless, jobs=4, progress=stop)
-    assert _processes_about(tmp_path / "out") == []
+    assert not [pid for pid in _processes_below(os.getpid()) if _works(pid)]
 
 
-def _processes_about(out: Path) -> list[str]:
-    numbers = filter(str.isdigit, os.listdir("/proc"))
-    return [pid for pid in numbers if str(out).encode() in _command(pid)]
-
-
-def _command(pid: str) -> bytes:
+def _works(pid: int) -> bool:
+    """Whether a process of this module's pools is there."""
     try:
-        return Path("/proc", pid, "cmdline").read_bytes()
+        return b"pianomime.workers" in Path("/proc", str(pid), "cmdline").read_bytes()
     except OSError:
-        return b""
+        return False

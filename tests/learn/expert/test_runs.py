@@ -1,4 +1,4 @@
-"""Runs: determinism, saving, going on after a kill, and what is refused."""
+"""Runs: determinism, checkpoints, resuming after a kill, and what is refused."""
 
 from __future__ import annotations
 
@@ -19,30 +19,21 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 
 from pianomime.errors import InputError
 from pianomime.learn.envs.batch import SongBatch
+from pianomime.learn.envs.config import ActionConfig, EnvConfig, RewardConfig
 from pianomime.learn.envs.sb3_env import Sb3Env
-from pianomime.learn.expert.config import (
-    ActionConfig,
-    EnvConfig,
-    EpisodeConfig,
-    ExpertConfig,
-    ObservationConfig,
-    PpoConfig,
-    RewardConfig,
-    from_json,
-    to_json,
-)
+from pianomime.learn.expert.config import ExpertConfig, PpoConfig
 from pianomime.learn.expert.expert import load_expert, train_expert
-from pianomime.learn.expert.expert_worker import Request
+from pianomime.learn.expert.expert_run import ExpertRun
+from pianomime.learn.expert.expert_worker import expert_request
 from pianomime.learn.expert.ppo import make_model
 from pianomime.learn.runs import safetensors_file
+from pianomime.learn.runs.config_json import from_json, to_json
 from pianomime.learn.runs.lock import run_lock
-from pianomime.learn.runs.run import RunFolder
 from pianomime.plan import FingertipPlan
 from pianomime.plan.demonstration import Demonstration
 from pianomime.world import WorldBatch
 
 METHODS = ("ppo", "search")
-NOTHING = ObservationConfig(False, False, False, 0, 0, False, False)
 
 
 @pytest.fixture
@@ -60,10 +51,10 @@ def config(
     return made
 
 
-def tensors_of(run: RunFolder) -> dict[str, bytes]:
+def tensors_of(run: ExpertRun) -> dict[str, bytes]:
     state = run.state()
     assert state is not None
-    return {name: array.tobytes() for name, array in {**state[0], **run.best()[0]}.items()}
+    return {name: array.tobytes() for name, array in {**state.arrays, **run.best()[0]}.items()}
 
 
 @pytest.mark.parametrize("config", METHODS, indirect=True)
@@ -84,14 +75,15 @@ def test_same_seed_same_expert_which_plays_what_was_measured(
     assert best["f1"] == max(one.f1 for one in run.curve())
 
 
-def kill_after_a_checkpoint(request: Request) -> None:
+def kill_after_a_checkpoint(request: dict[str, Any]) -> None:
     """Start the training in a process, and kill it in the middle."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "pianomime.learn.expert.expert_worker", request.text],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
+    script = (
+        "import json, sys\n"
+        "from pianomime.learn.expert.expert_worker import train_one\n"
+        "train_one(json.loads(sys.argv[1]))\n"
     )
-    curve = Path(request.out, "curve.json")
+    process = subprocess.Popen([sys.executable, "-c", script, json.dumps(request)])
+    curve = Path(request["out"], "curve.json")
     while process.poll() is None and (not curve.exists() or len(json.loads(curve.read_text())) < 2):
         time.sleep(0.002)
     process.send_signal(signal.SIGKILL)
@@ -102,23 +94,23 @@ def kill_after_a_checkpoint(request: Request) -> None:
 def test_a_killed_run_goes_on_to_the_same_curve(
     demo: Path, tmp_path: Path, config: ExpertConfig
 ) -> None:
-    config = dataclasses.replace(config, steps=3 * config.steps)
+    config = dataclasses.replace(config, total_steps=3 * config.total_steps)
     whole = train_expert(demo, tmp_path / "whole", config, threads=1)
-    request = Request(str(demo), str(tmp_path / "killed"), config, 0.0, 30.0)
+    request = expert_request(demo, tmp_path / "killed", config, 0.0, 30.0)
     kill_after_a_checkpoint(request)
-    before = RunFolder.load(tmp_path / "killed").steps_done
-    assert 0 < before < config.steps
+    before = ExpertRun.load(tmp_path / "killed").steps_done
+    assert 0 < before < config.total_steps
     resumed = train_expert(demo, tmp_path / "killed", config, threads=1)
     assert resumed.curve() == whole.curve()
     assert tensors_of(resumed) == tensors_of(whole)
 
 
 def test_more_steps_prolong_a_run(demo: Path, tmp_path: Path, small_ppo: ExpertConfig) -> None:
-    longer = dataclasses.replace(small_ppo, steps=2 * small_ppo.steps)
+    longer = dataclasses.replace(small_ppo, total_steps=2 * small_ppo.total_steps)
     whole = train_expert(demo, tmp_path / "whole", longer, threads=1)
     train_expert(demo, tmp_path / "parts", small_ppo, threads=1)
     # All steps are spent: there is nothing to do.
-    assert train_expert(demo, tmp_path / "parts", small_ppo).steps_done == small_ppo.steps
+    assert train_expert(demo, tmp_path / "parts", small_ppo).steps_done == small_ppo.total_steps
     longest = train_expert(demo, tmp_path / "parts", longer, threads=1)
     assert longest.curve() == whole.curve()
 
@@ -128,17 +120,17 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(
 ) -> None:
     out = tmp_path / "run"
     train_expert(demo, out, small_ppo, threads=1)
-    before = tensors_of(RunFolder.load(out))
-    longer = dataclasses.replace(small_ppo, steps=2 * small_ppo.steps)
+    before = tensors_of(ExpertRun.load(out))
+    longer = dataclasses.replace(small_ppo, total_steps=2 * small_ppo.total_steps)
 
     with full_disk():
         train_expert(demo, out, longer, threads=1)
-    assert tensors_of(RunFolder.load(out)) == before
+    assert tensors_of(ExpertRun.load(out)) == before
     assert not [name for name in os.listdir(out) if name.startswith(".")]
-    assert train_expert(demo, out, longer, threads=1).steps_done == longer.steps
+    assert train_expert(demo, out, longer, threads=1).steps_done == longer.total_steps
 
 
-@pytest.mark.parametrize("left", [(), ("song.npz",)])
+@pytest.mark.parametrize("left", [(), ("run.json",), ("run.json", "song.npz")])
 def test_a_run_that_was_killed_at_its_beginning_begins_anew(
     demo: Path,
     two_notes: Demonstration,
@@ -156,7 +148,7 @@ def test_a_run_that_was_killed_at_its_beginning_begins_anew(
         (out / name).mkdir()
         (out / name / "half").write_bytes(b"cut")
     again = train_expert(demo, out, small_search)
-    assert again.curve() == RunFolder.load(whole).curve()
+    assert again.curve() == ExpertRun.load(whole).curve()
     assert not [name for name in os.listdir(out) if name.startswith(".")]
     # A song of somebody else is no beginning.
     (tmp_path / "theirs").mkdir()
@@ -205,8 +197,8 @@ def test_the_curve_is_in_tensorboard(demo: Path, tmp_path: Path, config: ExpertC
     log = EventAccumulator(str(run.tensorboard))
     log.Reload()
     for name in ("precision", "recall", "f1"):
-        told = [(event.step, event.value) for event in log.Scalars(f"song/{name}")]
-        assert told == [
+        logged = [(event.step, event.value) for event in log.Scalars(f"eval/{name}")]
+        assert logged == [
             (one.steps, pytest.approx(getattr(one, name), abs=1e-6)) for one in run.curve()
         ]
 
@@ -223,7 +215,7 @@ def test_the_policy_works_the_pedal_when_it_plays(
     for sign in (1.0, -1.0):
         # The last layer alone says where the pedal is.
         arrays["4.weight"][46], arrays["4.bias"][46] = 0.0, sign
-        safetensors_file.write_tensors(run.path / "expert.safetensors", arrays, about)
+        safetensors_file.write_tensors(run.path / "result.safetensors", arrays, about)
         assert (load_expert(run.path)[0].play(score).pedal == (sign > 0)).all()
     plain = train_expert(demo, tmp_path / "plain", small_ppo, threads=1)
     played = load_expert(plain.path)[0].play(score)
@@ -237,14 +229,14 @@ def test_the_networks_are_as_the_settings_say(
     two_notes: Demonstration, activation: str, layer: type[torch.nn.Module]
 ) -> None:
     settings = PpoConfig(
-        envs=2,
+        num_envs=2,
         steps_per_update=32,
-        batch=32,
-        epochs=1,
+        batch_size=32,
+        n_epochs=1,
         hidden=(24, 12, 6),
         activation=activation,  # type: ignore[arg-type]
         learning_rate=1e-3,
-        decay=0.5,
+        learning_rate_decay=0.5,
     )
     model = make_model(Sb3Env(SongBatch(two_notes, EnvConfig(), 2, 1)), settings, 0)
     for network in (model.policy.mlp_extractor.policy_net, model.policy.mlp_extractor.value_net):
@@ -259,21 +251,21 @@ def test_the_networks_are_as_the_settings_say(
 
 @pytest.mark.parametrize("method", METHODS)
 def test_learning_works(demo: Path, tmp_path: Path, method: str) -> None:
-    """Two notes that the prior does not press; residuals do."""
+    """Two notes that the base controller does not press; residuals do."""
     ppo = PpoConfig(
-        envs=8,
+        num_envs=8,
         steps_per_update=464,
-        batch=116,
-        epochs=8,
+        batch_size=116,
+        n_epochs=8,
         hidden=(64, 32),
         learning_rate=3e-3,
-        noise=0.8,
-        discount=0.8,
+        initial_std=0.8,
+        gamma=0.8,
     )
     reward = RewardConfig(press=1.0, mimic=0.0, hit=0.9)
     env = EnvConfig(action=ActionConfig(factor=0.06), reward=reward)
     steps = 18 * 464 if method == "ppo" else 3000
-    config = ExpertConfig(method=method, steps=steps, env=env, ppo=ppo)  # type: ignore[arg-type]
+    config = ExpertConfig(method=method, total_steps=steps, env=env, ppo=ppo)  # type: ignore[arg-type]
     run = train_expert(demo, tmp_path / "run", config, threads=1)
     silent = 1.0 - float(run.song.score.roll().any(axis=1).mean())
     if method == "ppo":
@@ -284,12 +276,24 @@ def test_learning_works(demo: Path, tmp_path: Path, method: str) -> None:
 
 @pytest.mark.parametrize("kind", ["paper", "odd"])
 def test_configs_go_through_json(kind: str) -> None:
-    config = ExpertConfig() if kind == "paper" else ExpertConfig(ppo=PpoConfig(hidden=(8,), clip=1))
+    config = (
+        ExpertConfig()
+        if kind == "paper"
+        else ExpertConfig(ppo=PpoConfig(hidden=(8,), clip_range=1))
+    )
     assert from_json(ExpertConfig, json.loads(json.dumps(to_json(config)))) == config
 
 
 @pytest.mark.parametrize(
-    "change", [{"steps": "many"}, {"method": "magic"}, {"seed": None}, {"more": 1}, {"env": []}]
+    "change",
+    [
+        {"total_steps": "many"},
+        {"total_steps": 0},
+        {"method": "magic"},
+        {"seed": None},
+        {"more": 1},
+        {"env": []},
+    ],
 )
 def test_configs_of_another_kind_are_refused(change: dict[str, object]) -> None:
     with pytest.raises(InputError):
@@ -319,11 +323,11 @@ def test_folders_that_hold_something_else(
     (out / "state.safetensors").write_bytes(b"cut")
     with pytest.raises(InputError, match="damaged"):
         train_expert(demo, out, small_search)
-    (out / "expert.safetensors").write_bytes((out / "expert.safetensors").read_bytes()[:99])
+    (out / "result.safetensors").write_bytes((out / "result.safetensors").read_bytes()[:99])
     with pytest.raises(InputError, match="damaged"):
         load_expert(out)
     about(out, run_version=99)
-    with pytest.raises(InputError, match="version 99; this program reads 1"):
+    with pytest.raises(InputError, match="version 99; this program reads 2"):
         load_expert(out)
     with pytest.raises(InputError, match="not the folder of a run"):
         load_expert(tmp_path)
@@ -363,31 +367,32 @@ def test_songs_that_nothing_can_be_learned_on(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"steps": 0}, "steps must be 1 or more"),
+        ({"total_steps": 0}, "total-steps must be 1 or more"),
         ({"seed": -1}, "seed must be 0 or more"),
-        ({"ppo": {"envs": 3}}, "multiple"),
-        ({"ppo": {"batch": 1}}, "ppo.batch"),
-        ({"ppo": {"batch": 4096}}, "ppo.batch"),
+        ({"ppo": {"num_envs": 3}}, "multiple"),
+        ({"ppo": {"batch_size": 1}}, "ppo.batch-size"),
+        ({"ppo": {"batch_size": 4096}}, "ppo.batch-size"),
         ({"ppo": {"evaluate_every": 0}}, "ppo.evaluate-every must be 1 or more"),
-        ({"ppo": {"noise": 0.0}}, "ppo.noise must be more than 0"),
+        ({"ppo": {"initial_std": 0.0}}, "ppo.initial-std must be more than 0"),
         ({"ppo": {"learning_rate": float("nan")}}, "ppo.learning-rate"),
         ({"ppo": {"hidden": (0,)}}, "ppo.hidden"),
-        ({"ppo": {"discount": 1.5}}, "ppo.discount must be 0 to 1"),
+        ({"ppo": {"gamma": 1.5}}, "ppo.gamma must be 0 to 1"),
+        ({"ppo": {"activation": "step"}}, "ppo.activation must be one of gelu, relu, tanh"),
+        ({"method": "magic"}, "method must be one of ppo, search"),
         ({"method": "search", "search": {"sizes": ()}}, "search.sizes"),
         ({"method": "search", "search": {"ahead": 0}}, "search.ahead must be 1 or more"),
-        ({"env": {"episode": EpisodeConfig(frames=-5)}}, "env.episode.frames must be 0 or more"),
-        ({"env": {"observation": NOTHING}}, "must see something"),
     ],
 )
 def test_settings_that_do_not_fit(
-    demo: Path, tmp_path: Path, small_ppo: ExpertConfig, change: dict[str, Any], message: str
+    small_ppo: ExpertConfig, change: dict[str, Any], message: str
 ) -> None:
-    changed = {
-        name: dataclasses.replace(getattr(small_ppo, name), **value)
-        if isinstance(value, dict)
-        else value
-        for name, value in change.items()
-    }
     with pytest.raises(InputError, match=message):
-        train_expert(demo, tmp_path / "run", dataclasses.replace(small_ppo, **changed))
-    assert not (tmp_path / "run").exists()
+        dataclasses.replace(
+            small_ppo,
+            **{
+                name: dataclasses.replace(getattr(small_ppo, name), **value)
+                if isinstance(value, dict)
+                else value
+                for name, value in change.items()
+            },
+        )

@@ -10,12 +10,12 @@ import torch
 from stable_baselines3.common.vec_env import VecCheckNan
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from pianomime import Player
+from pianomime import load_player
 from pianomime.errors import InputError
 from pianomime.learn.fingers.config import FingersConfig
 from pianomime.learn.fingers.env import FingersVecEnv, PlannedSong, finger_rewards
 from pianomime.learn.fingers.training import train_fingers
-from pianomime.learn.runs.fit_folder import FitFolder
+from pianomime.learn.runs.run import RunFolder
 from pianomime.plan import FingertipPlan
 from pianomime.policies.finger_residual import (
     AMPLITUDE,
@@ -40,7 +40,7 @@ def silent(given):
 
 def curve(folder):
     """What TensorBoard shows of a training."""
-    shown = EventAccumulator(str(FitFolder(folder).tensorboard))
+    shown = EventAccumulator(str(RunFolder.load(folder).tensorboard))
     shown.Reload()
     return shown.Scalars("fingers/reward")
 
@@ -179,10 +179,10 @@ def test_what_was_trained_plays_and_is_taken_as_it_is(songs, two_notes, tmp_path
     made, measured = train_fingers([songs], tmp_path / "out", SMALL, 1)
     assert 0.0 < measured["unseen/f1_without"] <= 1.0
     monkeypatch.setenv(WEIGHTS, str(tmp_path / "out"))
-    player = Player.from_name("fingers", 0)
+    player = load_player("fingers", 0)
     first, again = (player.play(two_notes.score) for _ in range(2))
     np.testing.assert_array_equal(first.ctrl, again.ctrl)
-    zero_shot = Player.from_name("zero-shot", 0).play(two_notes.score)
+    zero_shot = load_player("zero-shot", 0).play(two_notes.score)
     assert not np.array_equal(first.ctrl, zero_shot.ctrl)
     written = made.stat().st_mtime_ns
     train_fingers([songs], tmp_path / "out", SMALL, 1)
@@ -197,12 +197,12 @@ def test_a_training_that_was_stopped_comes_to_the_same(songs, tmp_path, monkeypa
     monkeypatch.setattr(training, "_CHECKPOINT", 1)
     whole, _ = train_fingers([songs], tmp_path / "whole", SMALL, 1)
 
-    def stop(done: int, total: int, remark: str) -> None:
-        if done >= 240:
+    def stop(phase: str, done: int, total: int, remark: str = "") -> None:
+        if phase == "training" and done >= 240:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train_fingers([songs], tmp_path / "parts", SMALL, 1, tell=stop)
+        train_fingers([songs], tmp_path / "parts", SMALL, 1, progress=stop)
     train_fingers([songs], tmp_path / "parts", SMALL, 1)
     # The curve goes on where it was, and what came before is still shown.
     one, other = (
@@ -210,7 +210,7 @@ def test_a_training_that_was_stopped_comes_to_the_same(songs, tmp_path, monkeypa
     )
     assert one == other
     one, other = (
-        FitFolder(tmp_path / name / "fingers").weights()[0] for name in ("whole", "parts")
+        RunFolder.load(tmp_path / name / "fingers").result()[0] for name in ("whole", "parts")
     )
     for name, array in one.items():
         np.testing.assert_array_equal(array, other[name])
@@ -226,7 +226,7 @@ def test_the_file_says_what_the_network_says(songs, tmp_path):
     run, about = load_network(made)
     assert about["stage"] == "fingers"
     told = np.random.default_rng(0).normal(size=(10, SIZE)).astype(np.float32)
-    arrays, _ = read_tensors(tmp_path / "out" / "fingers" / "weights.safetensors")
+    arrays, _ = read_tensors(tmp_path / "out" / "fingers" / "result.safetensors")
     hidden = torch.nn.Sequential(torch.nn.Linear(SIZE, 8), torch.nn.Tanh(), torch.nn.Linear(8, 5))
     hidden.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in arrays.items()})
     with torch.inference_mode():

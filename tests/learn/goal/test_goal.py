@@ -93,7 +93,7 @@ def folder(tmp_path):
 
 
 def test_training_measures_on_other_files_and_can_be_read(folder, tmp_path):
-    config = GoalConfig(fit=TrainerConfig(steps=30, batch=16, warmup=2, bfloat16=False))
+    config = GoalConfig(trainer=TrainerConfig(steps=30, batch=16, warmup=2, bfloat16=False))
     figures, goals = train_goal([folder], tmp_path / "goal", config, quiet, quiet)
     assert (goals.files, goals.unseen_files, goals.skipped) == (5, 1, 1)
     assert 0 < figures.error_mm < 1e3 * KEYBOARD
@@ -108,10 +108,10 @@ def test_training_measures_on_other_files_and_can_be_read(folder, tmp_path):
 
 
 def test_it_learns_where_keys_are(folder, tmp_path):
-    short = GoalConfig(transpose=0, fit=TrainerConfig(steps=5, batch=32, warmup=1, bfloat16=False))
+    short = GoalConfig(transpose=0, trainer=TrainerConfig(steps=5, batch=32, warmup=1, bfloat16=False))
     config = GoalConfig(
         transpose=0,
-        fit=TrainerConfig(steps=400, batch=32, learning_rate=3e-3, warmup=20, bfloat16=False),
+        trainer=TrainerConfig(steps=400, batch=32, learning_rate=3e-3, warmup=20, bfloat16=False),
     )
     before, _ = train_goal([folder], tmp_path / "short", short, quiet, quiet)
     after, _ = train_goal([folder], tmp_path / "long", config, quiet, quiet)
@@ -128,8 +128,8 @@ def test_too_few_goals_to_measure_on_are_told_at_once(tmp_path):
 
 def test_the_same_seed_learns_the_same(folder, tmp_path):
     def codes(name, seed):
-        fit = TrainerConfig(steps=5, batch=16, warmup=1, seed=seed, bfloat16=False)
-        train_goal([folder], tmp_path / name, GoalConfig(fit=fit), quiet, quiet)
+        trainer = TrainerConfig(steps=5, batch=16, warmup=1, seed=seed, bfloat16=False)
+        train_goal([folder], tmp_path / name, GoalConfig(trainer=trainer), quiet, quiet)
         return load_encoder(tmp_path / name)(torch.eye(88))
 
     one = codes("one", 0)

@@ -18,18 +18,18 @@ import pytest
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from torch import nn
-from toy_fit import CONFIG, draw, error, loss, network, stop_at, train
+from toy_training import CONFIG, error, loss, network, sample_batch, stop_at, train
 
-from pianomime.errors import InputError
-from pianomime.learn.imitation import trainer as fit_module
+from pianomime.errors import InputError, TrainingDiverged
 from pianomime.learn.imitation.trainer import learning_rate, load_weights
 from pianomime.learn.imitation.trainer_config import TrainerConfig
-from pianomime.learn.runs.fit_folder import FitFolder
+from pianomime.learn.runs import run as run_module
 from pianomime.learn.runs.lock import run_lock
+from pianomime.learn.runs.run import RunFolder
 
 
 def bits(folder: Path) -> dict[str, bytes]:
-    return {name: array.tobytes() for name, array in FitFolder(folder).weights()[0].items()}
+    return {name: array.tobytes() for name, array in RunFolder.load(folder).result()[0].items()}
 
 
 def change(**fields: Any) -> TrainerConfig:
@@ -37,19 +37,19 @@ def change(**fields: Any) -> TrainerConfig:
 
 
 def test_it_learns(tmp_path: Path) -> None:
-    told: list[tuple[int, int, str]] = []
+    told: list[tuple[str, int, int, str]] = []
     before = error(network())["error"]
-    module = train(tmp_path / "run", evaluate=error, tell=lambda *progress: told.append(progress))
+    module = train(tmp_path / "run", evaluate=error, progress=lambda *step: told.append(step))
     assert error(module)["error"] < 0.06 < before / 5
     # What is in the module is what is in the file, and was measured.
     assert not module.training
     read = network()
     load_weights(tmp_path / "run", read)
-    assert error(read) == error(module) == FitFolder(tmp_path / "run").weights()[1]
+    assert error(read) == error(module) == RunFolder.load(tmp_path / "run").result()[1]
     assert {tensor.dtype for tensor in read.state_dict().values()} == {torch.float32}
-    assert told[-1][:2] == (CONFIG.steps, CONFIG.steps)
-    assert "loss" in told[-1][2]
-    assert [step for step, _, _ in told] == sorted(step for step, _, _ in told)
+    assert told[-1][:3] == ("training", CONFIG.steps, CONFIG.steps)
+    assert "loss" in told[-1][3]
+    assert [step[1] for step in told] == sorted(step[1] for step in told)
 
 
 def test_it_computes_what_a_loop_written_by_hand_does(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_it_computes_what_a_loop_written_by_hand_does(tmp_path: Path) -> None:
     optimizer = torch.optim.AdamW(module.parameters(), lr=0.0, weight_decay=0.1, foreach=False)
     average = [parameter.detach().clone() for parameter in module.parameters()]
     for step in range(config.steps):
-        arrays = draw(np.random.default_rng([config.seed, step]), config.batch)
+        arrays = sample_batch(np.random.default_rng([config.seed, step]), config.batch)
         batch = {name: torch.tensor(array) for name, array in arrays.items()}
         seed = np.random.SeedSequence([config.seed, step, 1]).generate_state(1)[0]
         torch.manual_seed(int(seed))
@@ -105,10 +105,10 @@ def test_same_seed_same_bits_however_often_it_is_interrupted(
             train(tmp_path / "parts", config, loss=stop_at(step, KeyboardInterrupt()))
         with pytest.raises(InputError, match="not trained to the end"):
             load_weights(tmp_path / "parts", network())
-    state = FitFolder(tmp_path / "parts").state()
+    state = RunFolder.load(tmp_path / "parts").state()
     assert state is not None
     # Of each part, all but the update that was interrupted.
-    assert state[1] == 0 + 1 + 23 + 12
+    assert state.steps == 0 + 1 + 23 + 12
     train(tmp_path / "parts", config)
     assert bits(tmp_path / "parts") == bits(tmp_path / "whole")
     # There is nothing left to do.
@@ -129,14 +129,14 @@ def test_evaluations_see_averaged_weights_and_change_nothing(tmp_path: Path) -> 
     train(tmp_path / "alone", config)
     assert bits(tmp_path / "watched") == bits(tmp_path / "alone")
     assert len(seen) == 3
-    final = FitFolder(tmp_path / "watched").weights()[0]
+    final = RunFolder.load(tmp_path / "watched").result()[0]
     assert all((tensor.numpy() == final[name]).all() for name, tensor in seen[-1].items())
     assert not all((tensor.numpy() == final[name]).all() for name, tensor in seen[0].items())
 
 
 def test_a_killed_training_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     steps = 2000
-    script = f"import toy_fit; toy_fit.long_run({str(tmp_path / 'killed')!r}, {steps})"
+    script = f"import toy_training; toy_training.long_run({str(tmp_path / 'killed')!r}, {steps})"
     places = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     process = subprocess.Popen(
         [sys.executable, "-c", script], env={**os.environ, "PYTHONPATH": places}
@@ -146,9 +146,9 @@ def test_a_killed_training_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     time.sleep(0.05)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    state = FitFolder(tmp_path / "killed").state()
+    state = RunFolder.load(tmp_path / "killed").state()
     assert state is not None
-    assert 0 < state[1] < steps
+    assert 0 < state.steps < steps
     config = change(steps=steps, checkpoint_seconds=60.0)
     train(tmp_path / "killed", config)
     train(tmp_path / "whole", config)
@@ -163,24 +163,24 @@ def test_a_loss_that_is_no_number_stops_it(tmp_path: Path, seconds: float) -> No
         return loss(module, batch) * (float("nan") if len(calls) == 5 else 1.0)
 
     calls: list[int] = []
-    with pytest.raises(InputError, match="at step 5:"):
+    with pytest.raises(TrainingDiverged, match="at step 5:"):
         train(tmp_path / "run", change(steps=60, checkpoint_seconds=seconds), loss=diverging)
-    state = FitFolder(tmp_path / "run").state()
+    state = RunFolder.load(tmp_path / "run").state()
     if seconds:
         assert state is None
     else:
         assert state is not None
-        assert state[1] == 4
-        assert all(np.isfinite(array).all() for array in state[0].values())
+        assert state.steps == 4
+        assert all(np.isfinite(array).all() for array in state.arrays.values())
 
 
 def test_a_gradient_that_is_no_number_stops_it(tmp_path: Path) -> None:
     def steep(module: nn.Module, batch: dict[str, torch.Tensor]) -> torch.Tensor:
         return (module(batch["x"]) * 0.0).sum().abs().sqrt()
 
-    with pytest.raises(InputError, match="at step 1:"):
+    with pytest.raises(TrainingDiverged, match="at step 1:"):
         train(tmp_path / "run", change(steps=30), loss=steep)
-    assert FitFolder(tmp_path / "run").state() is None
+    assert RunFolder.load(tmp_path / "run").state() is None
 
 
 def test_a_full_disk_leaves_the_last_good_checkpoint(tmp_path: Path, full_disk: Any) -> None:
@@ -190,9 +190,9 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(tmp_path: Path, full_disk: 
 
     with full_disk():
         train(out, config)
-    state = FitFolder(out).state()
+    state = RunFolder.load(out).state()
     assert state is not None
-    assert state[1] == 8
+    assert state.steps == 8
     train(out, config)
     train(tmp_path / "whole", config)
     assert bits(out) == bits(tmp_path / "whole")
@@ -201,9 +201,9 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(tmp_path: Path, full_disk: 
 @pytest.mark.parametrize(
     ("other", "message"),
     [
-        ({"learning_rate": 0.5}, "fit.learning_rate: 0.03 there, 0.5 now"),
-        ({"steps": 90}, "fit.steps: 30 there, 90 now"),
-        ({"seed": 3}, "fit.seed"),
+        ({"learning_rate": 0.5}, "trainer.learning_rate: 0.03 there, 0.5 now"),
+        ({"steps": 90}, "trainer.steps: 30 there, 90 now"),
+        ({"seed": 3}, "trainer.seed"),
     ],
 )
 @pytest.mark.parametrize("finished", [False, True])
@@ -223,21 +223,21 @@ def test_another_config_is_another_training(
 def test_what_else_the_weights_depend_on_is_kept_and_must_be_the_same(tmp_path: Path) -> None:
     about = {"network": {"wide": 16, "heads": (1, 2)}, "data": "abc"}
     config = change(steps=30)
-    train(tmp_path / "run", config, about=about)
-    kept = json.loads((tmp_path / "run/config.json").read_text())
+    train(tmp_path / "run", config, depends_on=about)
+    kept = RunFolder.load(tmp_path / "run").config
     assert kept["network"] == {"wide": 16, "heads": [1, 2]}
-    assert kept["fit"] == dataclasses.asdict(config)
+    assert kept["trainer"] == dataclasses.asdict(config)
     # What changes nothing may be another.
     free = dataclasses.replace(config, checkpoint_seconds=5.0, evaluate_every=7)
-    train(tmp_path / "run", free, about=about, loss=stop_at(1, AssertionError()))
+    train(tmp_path / "run", free, depends_on=about, loss=stop_at(1, AssertionError()))
     for wrong in ({**about, "data": "abd"}, {"data": "abc"}, {**about, "more": 1}, None):
         with pytest.raises(InputError, match="there"):
-            train(tmp_path / "run", config, about=wrong)
+            train(tmp_path / "run", config, depends_on=wrong)
 
 
 def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config, out = change(steps=30), tmp_path / "run"
-    with pytest.raises(InputError, match="no network was trained here"):
+    with pytest.raises(InputError, match="not the folder of a run"):
         load_weights(out, network())
     with pytest.raises(KeyboardInterrupt):
         train(out, config, loss=stop_at(20, KeyboardInterrupt()))
@@ -248,23 +248,23 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with pytest.raises(InputError, match=r"state\.safetensors: damaged"):
         train(out, config)
     (out / "state.safetensors").write_bytes(whole)
-    monkeypatch.setattr(fit_module, "run_lock", functools.partial(run_lock, patience=0.0))
+    monkeypatch.setattr(run_module, "run_lock", functools.partial(run_lock, patience=0.0))
     with run_lock(out), pytest.raises(InputError, match="another process"):
         train(out, config)
     train(out, config)
     with pytest.raises(InputError, match="another network"):
         load_weights(out, network(8))
-    weights = (out / "weights.safetensors").read_bytes()
-    (out / "weights.safetensors").write_bytes(weights[: len(weights) // 2])
-    with pytest.raises(InputError, match=r"weights\.safetensors: damaged"):
+    weights = (out / "result.safetensors").read_bytes()
+    (out / "result.safetensors").write_bytes(weights[: len(weights) // 2])
+    with pytest.raises(InputError, match=r"result\.safetensors: damaged"):
         train(out, config)
-    told = json.loads((out / "config.json").read_text())
-    (out / "config.json").write_text(json.dumps({**told, "fit_version": 99}))
-    with pytest.raises(InputError, match="version 99; this program reads 1"):
+    told = json.loads((out / "run.json").read_text())
+    (out / "run.json").write_text(json.dumps({**told, "run_version": 99}))
+    with pytest.raises(InputError, match="version 99; this program reads 2"):
         train(out, config)
-    for damaged in ("[]", "{", '{"fit": 1}', ""):
-        (out / "config.json").write_text(damaged)
-        with pytest.raises(InputError, match=r"config\.json: damaged"):
+    for damaged in ("[]", "{", '{"kind": 1}', '{"run_version": 2}', ""):
+        (out / "run.json").write_text(damaged)
+        with pytest.raises(InputError, match=r"run\.json: damaged"):
             train(out, config)
     (tmp_path / "theirs").mkdir()
     (tmp_path / "theirs/notes.txt").write_text("mine")
@@ -278,18 +278,17 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"steps": 0}, "fit.steps must be 1 or more"),
-        ({"batch": 0}, "fit.batch must be 1 or more"),
-        ({"learning_rate": float("nan")}, "fit.learning-rate must be more than 0"),
-        ({"warmup": 300}, "fit.warmup must be 0 to 299"),
-        ({"ema_power": 0.0}, "fit.ema-power must be more than 0"),
-        ({"seed": -1}, "fit.seed must be 0 or more"),
+        ({"steps": 0}, "trainer.steps must be 1 or more"),
+        ({"batch": 0}, "trainer.batch must be 1 or more"),
+        ({"learning_rate": float("nan")}, "trainer.learning-rate must be more than 0"),
+        ({"warmup": 300}, "trainer.warmup must be 0 to 299"),
+        ({"ema_power": 0.0}, "trainer.ema-power must be more than 0"),
+        ({"seed": -1}, "trainer.seed must be 0 or more"),
     ],
 )
-def test_settings_that_make_no_sense(tmp_path: Path, fields: dict[str, Any], message: str) -> None:
+def test_settings_that_make_no_sense(fields: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        train(tmp_path / "run", change(**fields))
-    assert not (tmp_path / "run").exists()
+        change(**fields)
 
 
 def test_tensorboard_shows_each_step_once(tmp_path: Path) -> None:
@@ -309,6 +308,23 @@ def test_tensorboard_shows_each_step_once(tmp_path: Path) -> None:
     train(tmp_path / "run", config, evaluate=looking)
     log = EventAccumulator(str(tmp_path / "run/tensorboard"))
     log.Reload()
-    for name in ("fit/loss", "fit/gradient_norm"):
+    for name in ("trainer/loss", "trainer/gradient_norm", "trainer/steps_per_second"):
         assert [event.step for event in log.Scalars(name)] == list(range(1, 61))
     assert [event.step for event in log.Scalars("error")] == [30, 60]
+    rates = [event.value for event in log.Scalars("trainer/learning_rate")]
+    assert rates == pytest.approx([learning_rate(config, step) for step in range(60)])
+
+
+def test_the_loss_of_held_out_samples_is_measured_and_changes_nothing(tmp_path: Path) -> None:
+    config = change(steps=60, evaluate_every=30)
+    held_out = sample_batch(np.random.default_rng(9), 64)
+    made = train(tmp_path / "run", config, held_out=held_out)
+    train(tmp_path / "alone", config)
+    assert bits(tmp_path / "run") == bits(tmp_path / "alone")
+    torch.manual_seed(0)
+    batch = {name: torch.from_numpy(array) for name, array in held_out.items()}
+    measured = RunFolder.load(tmp_path / "run").result()[1]["trainer/validation_loss"]
+    assert measured == pytest.approx(loss(made, batch).item(), rel=1e-5)
+    log = EventAccumulator(str(tmp_path / "run/tensorboard"))
+    log.Reload()
+    assert [event.step for event in log.Scalars("trainer/validation_loss")] == [30, 60]

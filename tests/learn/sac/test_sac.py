@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from stable_baselines3 import SAC
 
-from pianomime import Player
+from pianomime import load_player
 from pianomime.errors import InputError
-from pianomime.learn.runs.fit_folder import FitFolder
+from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.sac import training
 from pianomime.learn.sac.config import SacConfig
 from pianomime.learn.sac.training import STEPS, AskedSong, SacVecEnv, train_sac
@@ -44,7 +44,7 @@ def test_what_was_trained_plays(two_notes, tmp_path, monkeypatch):
     two_notes.score.to_midi(songs / "one.mid")
     made = train_sac([songs], tmp_path / "out", SMALL, 1)
     monkeypatch.setenv(WEIGHTS, str(tmp_path / "out"))
-    played = Player.from_name("multi-task-sac", 0).play(two_notes.score)
+    played = load_player("multi-task-sac", 0).play(two_notes.score)
     assert np.isfinite(played.ctrl).all()
     written = made.stat().st_mtime_ns
     train_sac([songs], tmp_path / "out", SMALL, 1)
@@ -76,20 +76,20 @@ def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monk
     two_notes.score.to_midi(songs / "one.mid")
     monkeypatch.setattr(training, "_CHECKPOINT", 50)
     train_sac([songs], tmp_path / "whole", config, 1)
-    kept = FitFolder.checkpoint
+    kept = RunFolder.checkpoint
 
     def stop(self, arrays, steps):
         kept(self, arrays, steps)
         if steps == 150:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(FitFolder, "checkpoint", stop)
+    monkeypatch.setattr(RunFolder, "checkpoint", stop)
     with pytest.raises(KeyboardInterrupt):
         train_sac([songs], tmp_path / "parts", config, 1)
-    monkeypatch.setattr(FitFolder, "checkpoint", kept)
+    monkeypatch.setattr(RunFolder, "checkpoint", kept)
     train_sac([songs], tmp_path / "parts", config, 1)
     one, other = (
-        FitFolder(tmp_path / name / "multi-task-sac").weights()[0] for name in ("whole", "parts")
+        RunFolder.load(tmp_path / name / "multi-task-sac").result()[0] for name in ("whole", "parts")
     )
     for name, array in one.items():
         np.testing.assert_array_equal(array, other[name])
@@ -109,9 +109,9 @@ def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "SAC", Kept)
     made = train_sac([songs], tmp_path / "out", SMALL, 1)
     (model, env), (run, _) = kept[0], load_network(made)
-    scaled = env.see()[:, 0]
+    scaled = env.agent_observations()[:, 0]
     env.scale = None
-    plain = env.see()[:, 0]
+    plain = env.agent_observations()[:, 0]
     wanted = STEPS * model.predict(scaled, deterministic=True)[0]
     given = {"goal": plain[:, : 4 * 88].reshape(-1, 4, 88), "vector": plain[:, 4 * 88 :]}
     np.testing.assert_allclose(run(given)[0][:, 0], wanted, atol=1e-3)

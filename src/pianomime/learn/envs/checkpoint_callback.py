@@ -88,9 +88,7 @@ class ResumableCallback(BaseCallback):
         self.model.num_timesteps = steps
         self._fresh = False
 
-    def learn(
-        self, model: BaseAlgorithm, steps: int, state: Checkpoint | None, path: Path
-    ) -> None:
+    def learn(self, model: BaseAlgorithm, steps: int, state: Checkpoint | None, path: Path) -> None:
         """Train a model up to a number of steps, from a checkpoint on if there is one.
 
         Args:

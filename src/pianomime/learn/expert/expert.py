@@ -71,6 +71,21 @@ def load_expert(path: Path) -> tuple[Player, ExpertRun]:
     return PlannedPlayer("expert", planner, tracker, excerpt=excerpt), run
 
 
+def load_expert_player(effort: int, seed: int, run: str | Path = "") -> Player:
+    """The player `expert`, for `pianomime.load_player`.
+
+    Args:
+        effort, seed: of no meaning for an expert, which plays as it was trained to.
+        run: folder of its run.
+
+    Raises:
+        InputError: as `load_expert`, or no folder is given.
+    """
+    if not run:
+        raise InputError("an expert is loaded by the folder of its run (`pianomime train-expert`)")
+    return load_expert(Path(run))[0]
+
+
 def expert_tracker(run: ExpertRun) -> Tracker:
     """The tracker of the best expert of a run.
 

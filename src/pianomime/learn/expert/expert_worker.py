@@ -1,138 +1,72 @@
-"""The process in which one expert of many is trained: a request in, a row out, as JSON.
-
-A process of its own, so that a crash costs one song; what it had is in the folder of its run. It
-ends when its input does, and so does not outlive the process that asked, however that ends.
-"""
+"""What `train_experts` has worker processes and the nodes of a cluster do: train an expert."""
 
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-import threading
 import time
-import traceback
-import warnings
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pianomime.errors import InputError
-from pianomime.learn.expert.config import ExpertConfig, from_json
+from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert import train_expert
+from pianomime.learn.runs.config_json import from_json, to_json
+from pianomime.workers import Answer, Row
 
-Row = dict[str, Any]
-"""What became of one song: `song`, and `f1`, `precision`, `recall`, `steps`, `seconds` of this
-call; or `song` and `error`."""
+EXPERT_WORKER = "pianomime.learn.expert.expert_worker:load_expert_worker"
+"""`load_expert_worker`, for `pianomime.workers`."""
 
 
-@dataclass(frozen=True)
-class Request:
-    """One expert to train.
+def expert_request(
+    song: Path, out: Path, config: ExpertConfig, start: float, seconds: float
+) -> dict[str, Any]:
+    """What `train_one` is asked, for JSON.
 
-    Attributes:
+    Args:
         song: a demonstration or a MIDI file.
         out: folder of its run.
         config: how.
-        start, seconds: the excerpt [s].
+        start: where the excerpt begins [s].
+        seconds: its length at most [s].
     """
-
-    song: str
-    out: str
-    config: ExpertConfig
-    start: float
-    seconds: float
-
-    @classmethod
-    def from_text(cls, text: str) -> Request:
-        """What `text` was."""
-        content = json.loads(text)
-        return cls(**{**content, "config": from_json(ExpertConfig, content["config"])})
-
-    @property
-    def text(self) -> str:
-        """As JSON."""
-        return json.dumps(asdict(self))
+    request: dict[str, Any] = {
+        "song": str(song),
+        "out": str(out),
+        "config": to_json(config),
+        "start": start,
+        "seconds": seconds,
+    }
+    # Lists for tuples, as where it passes through JSON: not every way to a node does.
+    copied: dict[str, Any] = json.loads(json.dumps(request))
+    return copied
 
 
-def train_one(request: Request) -> Row:
-    """Train an expert in this process, with one thread; the row of it, whatever happens."""
-    song = Path(request.song).stem
-    began = time.perf_counter()
-    try:
-        run = train_expert(
-            request.song,
-            Path(request.out),
-            request.config,
-            request.start,
-            request.seconds,
-            threads=1,
-        )
-        best = run.best()[1]
-    except (InputError, OSError) as error:
-        return {"song": song, "error": str(error)}
-    except Exception as error:  # A bug of ours must not cost the other songs either.
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        reason = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
-        return {"song": song, "error": reason}
-    spent = {"steps": run.steps_done, "seconds": round(time.perf_counter() - began, 1)}
-    return {"song": song, **best, **spent}
-
-
-class ExpertProcess:
-    """A process that trains one expert, started at once.
+def train_one(request: dict[str, Any]) -> Row:
+    """Train an expert in this process, with one thread.
 
     Args:
-        request: what to train.
+        request: made by `expert_request`.
+
+    Returns:
+        `f1`, `precision` and `recall` of the best expert; `steps` of the run; `seconds` that this
+        call took.
+
+    Raises:
+        InputError: the song, the config or what is in the folder cannot be used.
+        OSError: the folder cannot be written; what was there before stays.
     """
-
-    def __init__(self, request: Request) -> None:
-        self._song = Path(request.song).stem
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "pianomime.learn.expert.expert_worker", request.text],
-            stdout=subprocess.PIPE,
-            # Nothing is ever written to it; it ends with this process.
-            stdin=subprocess.PIPE,
-            encoding="utf-8",
-            # One song a core: more threads in each would only get in each other's way.
-            env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-            # Ctrl-C is for the process that asked, which then ends this one.
-            start_new_session=True,
-        )
-
-    def row(self) -> Row:
-        """Wait for the row."""
-        assert self._process.stdout is not None
-        said = self._process.stdout.read()
-        code = self._process.wait()
-        if code or not said.endswith("\n"):
-            return {"song": self._song, "error": f"its process died (exit code {code})"}
-        row: Row = json.loads(said)
-        return row
-
-    def close(self) -> None:
-        """End it, also in the middle of a song."""
-        self._process.kill()
-        self._process.wait()
+    began = time.perf_counter()
+    run = train_expert(
+        request["song"],
+        Path(request["out"]),
+        from_json(ExpertConfig, request["config"]),
+        request["start"],
+        request["seconds"],
+        threads=1,
+    )
+    spent = {"steps": run.steps_done, "seconds": round(time.perf_counter() - began, 1)}
+    return {**run.best()[1], **spent}
 
 
-def _end_with_input() -> None:
-    """End this process where it stands when its input ends, as after a kill of who asked."""
-    while os.read(0, 4096):
-        pass
-    os._exit(1)
-
-
-def main() -> None:
-    """Train what the only argument asks for."""
-    threading.Thread(target=_end_with_input, daemon=True).start()
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    # Anything that a library prints must not get into the row.
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    warnings.simplefilter("ignore")
-    print(json.dumps(train_one(Request.from_text(sys.argv[1]))), file=answers, flush=True)
-
-
-if __name__ == "__main__":
-    main()
+def load_expert_worker(setup: None) -> Answer:
+    """`train_one`, which needs no setup."""
+    return train_one

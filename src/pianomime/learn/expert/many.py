@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
-import os
-import threading
-from collections.abc import Callable, Generator
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.files import atomic
+from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.learn.expert.config import ExpertConfig
-from pianomime.learn.expert.expert_worker import ExpertProcess, Request, Row
-from pianomime.learn.expert.figure import draw_experts
+from pianomime.learn.expert.expert_worker import EXPERT_WORKER, expert_request
+from pianomime.learn.expert.f1_chart import draw_f1_chart
 from pianomime.learn.runs.run import is_run
-from pianomime.learn.runs.validation import check_config
-
-Progress = Callable[[int, int, float], None]
-"""Called with the songs done, the songs in all and the mean F1 so far (NaN before the first)."""
+from pianomime.progress import Progress, no_progress
+from pianomime.workers import Row, cores, work
 
 _SUFFIXES = (".npz", ".mid", ".midi")
 
@@ -31,10 +24,10 @@ def train_experts(
     out: Path,
     config: ExpertConfig,
     start: float = 0.0,
-    seconds: float = 30.0,
+    seconds: float = EXCERPT_SECONDS,
     jobs: int | None = None,
     ray: str | None = None,
-    progress: Progress | None = None,
+    progress: Progress = no_progress,
 ) -> list[Row]:
     """Train an expert of every demonstration and MIDI file in a folder.
 
@@ -49,7 +42,7 @@ def train_experts(
         seconds: its length at most [s].
         jobs: songs at the same time on this machine; one a core if None.
         ray: address of a Ray cluster whose nodes all see both folders; "local" starts one here.
-        progress: told how far it is.
+        progress: told the songs done, the songs in all and their mean F1 so far.
 
     Returns:
         A row for each song, in the order of their names.
@@ -59,7 +52,6 @@ def train_experts(
             such cluster.
         OSError: `out` cannot be written.
     """
-    check_config(config)
     songs = find_experts_songs(folder, out)
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
@@ -67,31 +59,31 @@ def train_experts(
         raise InputError(f"{out}: is a file; a folder is needed")
     out.mkdir(parents=True, exist_ok=True)
     requests = {
-        name: Request(str(song.resolve()), str(out.resolve() / name), config, start, seconds)
+        name: expert_request(song.resolve(), out.resolve() / name, config, start, seconds)
         for name, song in songs.items()
     }
     rows: dict[str, Row] = {}
 
-    def tell() -> None:
-        if progress is not None:
-            f1 = [row["f1"] for row in rows.values() if "error" not in row]
-            progress(len(rows), len(songs), sum(f1) / len(f1) if f1 else math.nan)
+    def report() -> None:
+        f1 = [row["f1"] for row in rows.values() if "error" not in row]
+        remark = f"mean F1 {sum(f1) / len(f1):.3f}" if f1 else ""
+        progress("songs", len(rows), len(songs), remark)
 
-    tell()
+    report()
     if ray is None:
-        trained = _in_processes(requests, jobs or _cores())
+        trained = work(EXPERT_WORKER, requests, jobs or cores(), request=requests.__getitem__)
     else:
         from pianomime.learn.expert.ray_cluster import on_cluster
 
         trained = on_cluster(requests, ray)
     with closing(trained):
         for name, row in trained:
-            rows[name] = {**row, "song": name}
-            tell()
+            rows[name] = {"song": name, **row}
+            report()
     ordered = [rows[name] for name in songs]
     _write(out / "experts.json", json.dumps(ordered, indent=1) + "\n")
     _write(out / "experts.md", experts_table(ordered))
-    draw_experts(ordered, out / "experts.png")
+    draw_f1_chart(ordered, out / "experts.png")
     return ordered
 
 
@@ -145,45 +137,6 @@ def experts_table(rows: list[Row]) -> str:
         means = (sum(row[n] for row in good) / len(good) for n in ("f1", "precision", "recall"))
         lines.append(f"| **mean of {len(good)}** | {' | '.join(f'{m:.3f}' for m in means)} | |")
     return "\n".join(lines) + "\n"
-
-
-def _in_processes(
-    requests: dict[str, Request], jobs: int
-) -> Generator[tuple[str, Row], None, None]:
-    """Rows in the order in which they are done."""
-    running: set[ExpertProcess] = set()
-    lock = threading.Lock()
-    stopped = False
-
-    def train(name: str) -> tuple[str, Row]:
-        with lock:
-            if stopped:
-                return name, {"error": "stopped"}
-            process = ExpertProcess(requests[name])
-            running.add(process)
-        row = process.row()
-        with lock:
-            running.discard(process)
-        return name, row
-
-    # The threads only wait for the processes.
-    threads = ThreadPoolExecutor(min(jobs, len(requests)))
-    try:
-        for future in as_completed([threads.submit(train, name) for name in requests]):
-            yield future.result()
-    finally:
-        with lock:
-            stopped = True
-            left: list[Any] = list(running)
-        threads.shutdown(wait=False, cancel_futures=True)
-        for process in left:
-            process.close()
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _write(path: Path, text: str) -> None:

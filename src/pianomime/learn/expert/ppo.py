@@ -20,9 +20,9 @@ from pianomime.learn.envs.batch import SongBatch
 from pianomime.learn.envs.checkpoint_callback import ResumableCallback
 from pianomime.learn.envs.sb3_env import Sb3Env
 from pianomime.learn.expert.config import PpoConfig
+from pianomime.learn.expert.expert_run import Evaluation, ExpertRun
 from pianomime.learn.expert.ppo_model import Ppo, actor_network
 from pianomime.learn.expert.residual_policy import ACTIVATIONS, ResidualPolicyTracker
-from pianomime.learn.expert.expert_run import Evaluation, ExpertRun
 from pianomime.learn.runs.safetensors_file import Arrays
 from pianomime.learn.runs.torch_threads import torch_threads
 from pianomime.plan.demonstration import DemonstrationPlanner
@@ -122,9 +122,7 @@ class _ExpertCallback(ResumableCallback):
         best = max((one.f1 for one in self.curve), default=0.0)
         now = self.curve[-1].f1 if self.curve else 0.0
         remark = f"F1 {now:.3f}, best {best:.3f}"
-        self._progress(
-            "training", self.model.num_timesteps, self._run.config.total_steps, remark
-        )
+        self._progress("training", self.model.num_timesteps, self._run.config.total_steps, remark)
         return True
 
     def _on_rollout_end(self) -> None:

@@ -10,14 +10,15 @@ from typing import Any
 import ray
 
 from pianomime.errors import InputError
-from pianomime.learn.expert.expert_worker import Request, Row, train_one
+from pianomime.learn.expert.expert_worker import train_one
+from pianomime.workers import Row, answered
 
 _TRIES = 10
 """Times that a song is begun again when the node that it was on is lost."""
 
 
 def on_cluster(
-    requests: dict[str, Request], address: str
+    requests: dict[str, dict[str, Any]], address: str
 ) -> Generator[tuple[str, Row], None, None]:
     """Rows in the order in which they are done.
 
@@ -46,9 +47,7 @@ def on_cluster(
             raise InputError(f"no Ray cluster at {address!r} ({error})") from error
     try:
         task = ray.remote(num_cpus=1, max_retries=_TRIES)(_train)
-        waiting: dict[Any, str] = {
-            task.remote(request.text): name for name, request in requests.items()
-        }
+        waiting: dict[Any, str] = {task.remote(request): name for name, request in requests.items()}
         while waiting:
             done, _ = ray.wait(list(waiting), num_returns=1)
             name = waiting.pop(done[0])
@@ -74,5 +73,5 @@ def _reachable(address: str) -> None:
         raise InputError(f"no Ray cluster at {address!r} ({error})") from error
 
 
-def _train(text: str) -> Row:
-    return train_one(Request.from_text(text))
+def _train(request: dict[str, Any]) -> Row:
+    return answered(train_one, request)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.learn.envs.batch import base_controller
 from pianomime.learn.envs.config import EnvConfig
-from pianomime.learn.envs.observation import Observer, control_range, observation_terms
+from pianomime.learn.envs.observation import Observer, control_range, default_observation_terms
 from pianomime.learn.envs.reference import Reference
 from pianomime.learn.envs.state import EnvState
 from pianomime.learn.expert.config import ExpertConfig, PpoConfig
@@ -69,7 +69,7 @@ class ResidualPolicyTracker:
         Raises:
             InputError: they are the weights of another network.
         """
-        observer = Observer(observation_terms(config.env.observation))
+        observer = Observer(default_observation_terms(config.env.observation))
         network = actor(config.ppo, observer.size, LAYOUT.ctrl_size + config.env.action.pedal)
         weights = {name: torch.from_numpy(array.copy()) for name, array in arrays.items()}
         try:
@@ -108,7 +108,7 @@ class ResidualPolicyController:
         self.plan = reference.plan
         self._reference, self._network = reference, network
         self._base = base_controller(config, reference.plan)
-        self._observer = Observer(observation_terms(config.observation))
+        self._observer = Observer(default_observation_terms(config.observation))
         self._residual_range = config.action.factor * control_range()
         self._works_pedal = config.action.pedal
         self._pedal = reference.pedal.copy()

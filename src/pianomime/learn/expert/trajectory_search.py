@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from pianomime.learn.envs.batch import base_tracker
 from pianomime.learn.expert.config import TrajectorySearchConfig
-from pianomime.learn.runs.log import RunLog
 from pianomime.learn.expert.expert_run import Evaluation, ExpertRun
+from pianomime.learn.runs.log import RunLog
+from pianomime.music import Score
 from pianomime.players.performance import Performance
 from pianomime.players.player import Player
-from pianomime.music import Score
 from pianomime.progress import Progress
 from pianomime.track import (
     PredictiveSamplingConfig,
@@ -129,11 +129,11 @@ def _play(
     progress: Progress,
 ) -> Performance:
     best = max((one.f1 for one in curve), default=0.0)
-    remark = f"pass {len(curve) + 1}, F1 {best:.3f}"
+    shown = f"pass {len(curve) + 1}, F1 {best:.3f}"
 
-    def passed_on(phase: str, done: int, total: int, _: str = "") -> None:
+    def passed_on(phase: str, done: int, total: int, remark: str = "") -> None:
         spent = min(steps + player.steps + done, run.config.total_steps)
-        progress("training", spent, run.config.total_steps, remark)
+        progress("training", spent, run.config.total_steps, shown)
 
     return player.play(run.song.score, passed_on)
 

@@ -1,7 +1,8 @@
-"""Training of the residual that all fingers share, from songs to the file that is played."""
+"""Training of the finger residual, from MIDI files to the file that is played."""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from collections.abc import Sequence
 from contextlib import closing
@@ -10,30 +11,33 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger
+from torch import Tensor, nn
 
+from pianomime.files import files_digest
 from pianomime.learn.envs.checkpoint_callback import ResumableCallback
 from pianomime.learn.envs.reference import load_score
 from pianomime.learn.expert.ppo_model import Ppo, actor_network
-from pianomime.learn.fingers.config import FingersConfig, check_fingers
-from pianomime.learn.fingers.env import AGENTS, FingersVecEnv, PlannedSong
+from pianomime.learn.fingers.config import FingersConfig
+from pianomime.learn.fingers.env import FingersVecEnv, PlannedSong
 from pianomime.learn.imitation.export import export_network
-from pianomime.learn.runs.fit_folder import FitFolder
 from pianomime.learn.runs.log import RunLog
-from pianomime.learn.runs.stage_folder import stage_folder
-from pianomime.learn.runs.tell import Tell
+from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.torch_threads import torch_threads
-from pianomime.learn.runs.validation import within
 from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
-from pianomime.players.player import Player
-from pianomime.policies.finger_residual import SIZE, FingerResidualTracker
+from pianomime.players.player import PlannedPlayer
+from pianomime.policies.finger_residual import ACTIONS, AGENTS, SIZE, FingerResidualTracker
 from pianomime.policies.methods import FINGERS
+from pianomime.policies.policy import PolicyInfo
+from pianomime.progress import Progress, no_progress
 from pianomime.songs.find import find_songs
 from pianomime.track import DynamicTracker, Tracker
+from pianomime.validation import within
 
-_MEASURED = 8
-"""Songs that are kept from training, by which it is seen how well it goes."""
-_CHECKPOINT = 20
+_VALIDATION_SONGS = 8
+"""Songs that are kept from training, on which the F1 is measured."""
+_CHECKPOINT_UPDATES = 20
 """Updates between checkpoints."""
 
 
@@ -42,60 +46,71 @@ def train_fingers(
     out: Path,
     config: FingersConfig,
     threads: int = 0,
-    tell: Tell | None = None,
-    preparing: Tell | None = None,
+    progress: Progress = no_progress,
 ) -> tuple[Path, dict[str, float]]:
-    """Train, or go on where its training was.
+    """Train the finger residual, or resume its training.
 
     Args:
-        folders: of MIDI files; a few are kept to measure on.
+        folders: of MIDI files; a few of these are kept for validation.
         out: folder; `fingers.onnx` is the result, and `fingers` holds the training.
-        config: how.
+        config: how to train it.
         threads: of the physics and of the network; 0 for one on each core.
-        tell: told how far it is.
-        preparing: told how many songs are planned.
+        progress: told the songs that are planned, then the frames that were played.
 
     Returns:
-        The result, and the F1 on the songs that were kept, without and with it (before the file
-        keeps half of its digits).
+        The ONNX file, and the mean F1 on the validation songs: `validation/f1` with the residual
+        (in full precision; the file has half), and `validation/f1_base` without.
 
     Raises:
-        InputError: the config or a song cannot be used, or the folder holds another training.
+        InputError: a song cannot be used, or the folder holds another training.
         OSError: a file cannot be read or written.
     """
-    check_fingers(config)
     within("threads", threads, 0)
     # Each content once, by its digest: which are kept hardly depends on what else there is.
     contents = {hashlib.sha256(path.read_bytes()).hexdigest(): path for path in find_songs(folders)}
     paths = [contents[digest] for digest in sorted(contents)]
-    within("number of songs", len(paths), _MEASURED + 1)
-    with stage_folder(out, FINGERS, config, paths) as (folder, result):
-        if folder.finished and result.exists():
-            return result, folder.weights()[1]
+    within("number of songs", len(paths), _VALIDATION_SONGS + 1)
+    result = out / f"{FINGERS}.onnx"
+    content = {**dataclasses.asdict(config), "data": files_digest(paths)[:16]}
+    with RunFolder.open(out / FINGERS, FINGERS, content) as folder:
+        if folder.has_result and result.exists():
+            return result, folder.result()[1]
         songs = []
         for done, song in enumerate(paths, 1):
             songs.append(PlannedSong.of(load_score(song, 0.0, config.seconds)))
-            if preparing is not None:
-                preparing(done, len(paths), "")
-        held, learned = songs[:_MEASURED], songs[_MEASURED:]
-        env = FingersVecEnv(learned, config, threads)
+            progress("planning", done, len(paths))
+        validation, train = songs[:_VALIDATION_SONGS], songs[_VALIDATION_SONGS:]
+        env = FingersVecEnv(train, config, threads)
         model = _model(env, config)
         model.threads = threads or torch.get_num_threads()
         state = folder.state()
-        since = 1 if state is None else state[1] + 1
+        since = 1 if state is None else state.steps + 1
         with closing(RunLog(folder.tensorboard, since)) as log:
-            boundary = _Boundary(folder, env, config, log, tell)
+            callback = _Callback(folder, env, config, log, progress)
             model.set_logger(Logger(None, []))
-            boundary.learn(model, config.frames * AGENTS, state, folder.path)
+            callback.learn(model, config.total_steps * AGENTS, state, folder.path)
         network = actor_network(model).eval()
-        measured = _measure(held, network)
+        metrics = _evaluate(validation, network)
         weights = {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}
-        # One of another training is not to be taken for this one if the export fails.
+        # A file of another training must not be taken for the result if the export fails.
         result.unlink(missing_ok=True)
-        folder.finish(weights, measured)
-        told = {"stage": FINGERS, "level": "fingers"}
-        export_network(network, (torch.zeros(2, SIZE),), ["told"], ["said"], told, result)
-    return result, measured
+        folder.keep_result(weights, metrics)
+        info = PolicyInfo(FINGERS, "finger", "mlp", ACTIONS, residual=True, data=content["data"])
+        example = {"observation": torch.zeros(2, SIZE)}
+        export_network(_Actor(network), example, ["action"], info, result)
+    return result, metrics
+
+
+class _Actor(nn.Module):
+    """The actor with a named input."""
+
+    def __init__(self, network: nn.Module) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, observation: Tensor) -> Tensor:
+        action: Tensor = self.network(observation)
+        return action
 
 
 def _model(env: FingersVecEnv, config: FingersConfig) -> Ppo:
@@ -104,67 +119,66 @@ def _model(env: FingersVecEnv, config: FingersConfig) -> Ppo:
         "MlpPolicy",
         env,
         learning_rate=lambda left: config.learning_rate * max(left, 0.0),
-        n_steps=config.frames_per_update // config.worlds,
-        batch_size=config.batch,
-        n_epochs=config.epochs,
-        gamma=config.discount,
-        gae_lambda=config.gae,
+        n_steps=config.steps_per_update // config.num_envs,
+        batch_size=config.batch_size,
+        n_epochs=config.n_epochs,
+        gamma=config.gamma,
+        gae_lambda=config.gae_lambda,
         policy_kwargs={
             "net_arch": {"pi": hidden, "vf": hidden},
             "activation_fn": torch.nn.Tanh,
-            "log_std_init": float(np.log(config.noise)),
+            "log_std_init": float(np.log(config.action_std)),
         },
         seed=config.seed,
         device="cpu",
     )
 
 
-class _Boundary(ResumableCallback):
-    """Tells, and writes a checkpoint every now and then."""
+class _Callback(ResumableCallback):
+    """Logs the reward of every update, and writes a checkpoint now and then."""
 
     def __init__(
         self,
-        folder: FitFolder,
+        folder: RunFolder,
         env: FingersVecEnv,
         config: FingersConfig,
         log: RunLog,
-        tell: Tell | None,
+        progress: Progress,
     ) -> None:
-        super().__init__(env, config.seed, config.frames_per_update * AGENTS)
+        super().__init__(env, config.seed, config.steps_per_update * AGENTS)
         self._folder, self._config = folder, config
-        self._log, self._tell = log, tell
+        self._log, self._progress = log, progress
 
-    def keep(self, update: int, steps: int) -> None:
-        """As `ResumableCallback.keep`."""
-        if update % _CHECKPOINT == 0 and update:
+    def save(self, update: int, steps: int) -> None:
+        """As `ResumableCallback.save`."""
+        if update % _CHECKPOINT_UPDATES == 0 and update:
             self._folder.checkpoint(self.arrays(), steps)
 
     def _on_rollout_end(self) -> None:
         buffer = self.model.rollout_buffer  # type: ignore[attr-defined]
         reward = float(buffer.rewards.mean())
-        self._log.add(self.model.num_timesteps, {"fingers/reward": reward})
-        if self._tell is not None:
-            done = self.model.num_timesteps // AGENTS
-            self._tell(done, self._config.frames, f"reward {reward:.4f}")
+        self._log.add(self.model.num_timesteps, {"rollout/reward": reward})
+        done = self.model.num_timesteps // AGENTS
+        self._progress("training", done, self._config.total_steps, f"reward {reward:.4f}")
 
 
-def _measure(songs: list[PlannedSong], network: torch.nn.Module) -> dict[str, float]:
-    """Mean F1 of songs, with the dynamic tracker alone and with what it learned."""
+def _evaluate(songs: list[PlannedSong], network: nn.Module) -> dict[str, float]:
+    """Mean F1 of songs with the finger residual, and with the dynamic tracker alone."""
 
-    def run(given: dict[str, Any]) -> list[Any]:
+    def run(inputs: dict[str, NDArray[Any]]) -> list[NDArray[np.float32]]:
         with torch.inference_mode():
-            return [network(torch.from_numpy(given["told"])).numpy()]
+            return [network(torch.from_numpy(inputs["observation"])).numpy()]
 
     with torch_threads(1):
         return {
             name: float(np.mean([_f1(song.demonstration, tracker) for song in songs]))
             for name, tracker in (
-                ("unseen/f1_without", DynamicTracker()),
-                ("unseen/f1", FingerResidualTracker(run)),
+                ("validation/f1_base", DynamicTracker()),
+                ("validation/f1", FingerResidualTracker(run)),
             )
         }
 
 
 def _f1(song: Demonstration, tracker: Tracker) -> float:
-    played = Player(FINGERS, DemonstrationPlanner(song), tracker).play(song.score)
+    played = PlannedPlayer(FINGERS, DemonstrationPlanner(song), tracker).play(song.score)
     return float(played.metrics()["f1"])

@@ -1,4 +1,4 @@
-"""Training of the goal autoencoder (paper, algorithm 2), and what it came to."""
+"""Training of the goal autoencoder (paper, algorithm 2), and its evaluation."""
 
 from __future__ import annotations
 
@@ -14,76 +14,91 @@ from torch import Tensor, nn
 
 from pianomime.errors import InputError
 from pianomime.learn.goal.autoencoder import GoalAutoencoder, GoalEncoder
-from pianomime.learn.goal.config import GoalConfig, check_goal
-from pianomime.learn.goal.goals import GoalDraw, Goals, GoalSplit, read_goals
+from pianomime.learn.goal.config import GoalConfig
+from pianomime.learn.goal.goals import Goals, GoalSampler, GoalSplit, read_goals
 from pianomime.learn.goal.picture import draw_codes
-from pianomime.learn.goal.sdf import KEYBOARD, QUERY_HIGH, QUERY_LOW, chamfer, distance
-from pianomime.learn.imitation.trainer import Batch, fit, load_arrays
+from pianomime.learn.goal.sdf import KEYBOARD_LENGTH, QUERY_HIGH, QUERY_LOW, chamfer, distance
+from pianomime.learn.imitation.trainer import Batch, load_arrays, train_network
 from pianomime.learn.runs.safetensors_file import read_tensors, write_tensors
-from pianomime.learn.runs.tell import Tell
+from pianomime.progress import Progress, no_progress
 
 _RESULT = "goal.safetensors"
 _VERSION = 1
-_STANDARD = 20_000
-"""Goals from which mean and deviation of the codes are taken."""
-_MEASURED = 4_000
-"""Unseen goals on which the reconstruction is measured."""
+_STANDARDIZED = 20_000
+"""Training goals from which mean and standard deviation of the codes are computed."""
+_VALIDATED = 4_000
+"""Validation goals on which the error of the decoded distance is measured."""
 _COMPARED = 600
-"""Unseen goals whose distances from each other are compared."""
+"""Validation goals that are compared in pairs."""
+_POINTS = 16
+"""Points at which the distance to each validation goal is decoded."""
 
 
 @dataclass(frozen=True)
-class GoalFigures:
-    """How good an encoder is, on goals of files that it has not seen.
+class GoalMetrics:
+    """How good a goal autoencoder is, on validation goals.
 
     Attributes:
         error_mm: mean error of the decoded distance [mm].
-        near_codes: rank correlation of the distance of codes with that of goals, `chamfer`.
-        near_keys: the same of the number of keys in which goals differ, for comparison.
+        code_correlation: rank correlation (Spearman) of the distances between codes with the
+            Chamfer distances between goals.
+        key_correlation: the same for the number of keys in which goals differ, as a baseline.
     """
 
     error_mm: float
-    near_codes: float
-    near_keys: float
+    code_correlation: float
+    key_correlation: float
 
 
 def train_goal(
-    folders: Sequence[Path], out: Path, config: GoalConfig, tell: Tell, reading: Tell
-) -> tuple[GoalFigures, GoalSplit]:
-    """Train a goal autoencoder, or go on where its training was.
+    folders: Sequence[Path], out: Path, config: GoalConfig, progress: Progress = no_progress
+) -> tuple[GoalMetrics, GoalSplit]:
+    """Train a goal autoencoder, or resume its training.
 
     Args:
         folders: of MIDI files.
         out: folder of the training and its result.
-        config: how.
-        tell: told how far the training is.
-        reading: told how many files are read.
+        config: how to train it.
+        progress: told the files that are read, then the updates that were done.
+
+    Returns:
+        The metrics on the validation goals, and all goals.
 
     Raises:
         InputError: there are no goals, or the folder holds another training.
         OSError: a file cannot be read or written.
     """
-    check_goal(config)
-    goals = read_goals(folders, config.unseen, reading)
-    torch.manual_seed(config.fit.seed)
+    goals = read_goals(folders, config.validation_share, progress)
+    torch.manual_seed(config.trainer.seed)
     module = GoalAutoencoder(config.octaves)
-    about = {
-        **dataclasses.asdict(config),
-        "goals": goals.train.digest,
-        "unseen_goals": goals.unseen.digest,
-    }
+    settings = dataclasses.asdict(config)
+    # The trainer adds its own.
+    del settings["trainer"]
+    validation = _subset(goals.validation, _VALIDATED)
     out.mkdir(parents=True, exist_ok=True)
-    fit(out, module, _loss, GoalDraw(goals.train, config), config.fit, tell=tell, about=about)
+    train_network(
+        out,
+        module,
+        _loss,
+        GoalSampler(goals.train, config),
+        config.trainer,
+        progress=progress,
+        depends_on={
+            **settings,
+            "goals": goals.train.digest,
+            "validation_goals": goals.validation.digest,
+        },
+    )
     with torch.no_grad():
-        module.encoder.standardise(_some(goals.train, _STANDARD))
+        module.encoder.standardize(_subset(goals.train, _STANDARDIZED))
     weights = {name: tensor.numpy() for name, tensor in module.state_dict().items()}
     write_tensors(out / _RESULT, weights, {"version": _VERSION, "octaves": config.octaves})
-    draw_codes(module.encoder, _some(goals.unseen, _MEASURED), out / "codes.png")
-    return measure(module, goals.unseen), goals
+    draw_codes(module.encoder, validation, out / "codes.png")
+    return evaluate_autoencoder(module, validation), goals
 
 
 def load_encoder(folder: Path) -> GoalEncoder:
-    """The encoder of a training, which learns no more.
+    """The encoder of a finished training, with frozen weights.
 
     Raises:
         InputError: there is none, or it is damaged or of another version.
@@ -92,45 +107,45 @@ def load_encoder(folder: Path) -> GoalEncoder:
 
 
 def load_autoencoder(folder: Path) -> GoalAutoencoder:
-    """The result of a training, in eval mode.
+    """The autoencoder of a finished training, in eval mode.
 
     Raises:
         InputError: there is none, or it is damaged or of another version.
     """
     path = folder / _RESULT
-    arrays, about = read_tensors(path)
-    if about.get("version") != _VERSION or "octaves" not in about:
+    arrays, metadata = read_tensors(path)
+    if metadata.get("version") != _VERSION or "octaves" not in metadata:
         raise InputError(f"{path}: not a goal autoencoder, or one of another version")
-    module = GoalAutoencoder(about["octaves"])
+    module = GoalAutoencoder(metadata["octaves"])
     load_arrays(module, arrays, path)
     return module.eval()
 
 
 @torch.no_grad()
-def measure(module: GoalAutoencoder, unseen: Goals) -> GoalFigures:
-    """How good an autoencoder is, on goals that it has not seen."""
-    draw = np.random.default_rng(0)
-    goal = _some(unseen, _MEASURED)
-    query = torch.from_numpy(draw.uniform(QUERY_LOW, QUERY_HIGH, (len(goal), 16, 3))).float()
-    off = module(goal, query) * KEYBOARD - distance(goal[:, None], query)
+def evaluate_autoencoder(module: GoalAutoencoder, goal: Tensor) -> GoalMetrics:
+    """The metrics of an autoencoder on goals (N, 88) that it was not trained on."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform(QUERY_LOW, QUERY_HIGH, (len(goal), _POINTS, 3))
+    query = torch.from_numpy(points).float()
+    error = module(goal, query) * KEYBOARD_LENGTH - distance(goal[:, None], query)
     few = goal[goal.any(dim=1)][:_COMPARED]
     pairs = torch.triu_indices(len(few), len(few), 1).unbind()
-    apart = chamfer(few)[pairs]
-    codes = torch.cdist(*(module.encoder(few),) * 2)[pairs]
-    keys = torch.cdist(few, few, p=1)[pairs]
-    return GoalFigures(
-        float(off.abs().mean() * 1e3),
-        float(spearmanr(apart, codes).statistic),
-        float(spearmanr(apart, keys).statistic),
+    goals_apart = chamfer(few)[pairs]
+    codes_apart = torch.cdist(*(module.encoder(few),) * 2)[pairs]
+    keys_apart = torch.cdist(few, few, p=1)[pairs]
+    return GoalMetrics(
+        float(error.abs().mean() * 1e3),
+        float(spearmanr(goals_apart, codes_apart).statistic),
+        float(spearmanr(goals_apart, keys_apart).statistic),
     )
 
 
 def _loss(module: nn.Module, batch: Batch) -> Tensor:
-    true = distance(batch["goal"][:, None], batch["query"]) / KEYBOARD
-    return nn.functional.mse_loss(module(batch["goal"], batch["query"]), true)
+    target = distance(batch["goal"][:, None], batch["query"]) / KEYBOARD_LENGTH
+    return nn.functional.mse_loss(module(batch["goal"], batch["query"]), target)
 
 
-def _some(goals: Goals, most: int) -> Tensor:
-    """(n, 88) goals, evenly spread over those there are in an order by chance."""
-    order = np.random.default_rng(0).permutation(len(goals))[:most]
+def _subset(goals: Goals, limit: int) -> Tensor:
+    """(n, 88) goals as 0.0 and 1.0: a random subset with a fixed seed, in random order."""
+    order = np.random.default_rng(0).permutation(len(goals))[:limit]
     return torch.from_numpy(goals.keys(order).astype(np.float32))

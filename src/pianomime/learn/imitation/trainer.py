@@ -1,9 +1,9 @@
-"""The training loop of every network that imitates: AdamW, a cosine, an average of the weights.
+"""Supervised training loop: AdamW, warm-up and cosine decay, an average of the weights (EMA).
 
-A training can be stopped at any instant and goes on to the same weights, bit for bit on the same
-processor and number of cores. The batch of a step is drawn from a generator seeded by the
-training's seed and the number of the step, and so is all that torch draws in that step. The rest,
-weights, their average and the optimizer's moments, is in the checkpoint.
+It can be stopped at any instant and resumed to the same weights, bit for bit on the same processor
+and number of cores: the batch of a step is sampled by a random generator that is seeded by the
+config's seed and the number of the step, and so are all random numbers of torch in that step. The
+weights, their average and the moments of the optimizer are in the checkpoint.
 
 On a GPU the network is compiled. On several, under `accelerate launch`, each has its share of every
 batch. On a processor with instructions for it, matrices are multiplied in bfloat16.
@@ -26,80 +26,83 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from pianomime.errors import InputError
-from pianomime.learn.imitation.trainer_config import TrainerConfig, check_fit
-from pianomime.learn.runs.fit_folder import FitFolder
-from pianomime.learn.runs.lock import run_lock
+from pianomime.errors import InputError, TrainingDiverged
+from pianomime.learn.imitation.trainer_config import MAY_DIFFER, TrainerConfig
 from pianomime.learn.runs.log import RunLog
+from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.safetensors_file import Arrays
-from pianomime.learn.runs.tell import Tell
 from pianomime.learn.runs.torch_threads import torch_threads
+from pianomime.progress import Progress, no_progress
 
 Batch = dict[str, Tensor]
 """Named tensors whose first axis is that of the samples."""
+Samples = Mapping[str, NDArray[Any]]
+"""Named arrays whose first axis is that of the samples."""
 Loss = Callable[[nn.Module, Batch], Tensor]
-"""The mean loss of a batch. It calls the network it is given, not a part of it: what that is may be
+"""The mean loss of a batch. It calls the network it is given, not a part of it: that network may be
 wrapped for several GPUs."""
-Draw = Callable[[np.random.Generator, int], Mapping[str, NDArray[Any]]]
-"""So many samples, drawn by this generator alone; called a step ahead, from another thread."""
+SampleBatch = Callable[[np.random.Generator, int], Samples]
+"""Samples so many, with this random generator alone; called a step ahead, from another thread."""
 Evaluate = Callable[[nn.Module], dict[str, float]]
-"""Figures of a network, which is in eval mode, on the device where it is trained."""
+"""Metrics of a network, which is in eval mode, on the device where it is trained."""
 
-_GRADIENT_NORM = 1.0
-"""Largest."""
-_PAUSE = 1.0
-"""[s] Between looks at the loss: each makes a GPU wait."""
+_KIND = "network"
+_MAX_GRAD_NORM = 1.0
+"""Gradients are clipped to this norm."""
+_LOG_SECONDS = 1.0
+"""[s] between looks at the loss, each of which makes a GPU wait."""
 
 
-def fit(
+def train_network(
     folder: Path,
     module: nn.Module,
     loss: Loss,
-    draw: Draw,
+    sample_batch: SampleBatch,
     config: TrainerConfig,
     evaluate: Evaluate | None = None,
-    tell: Tell | None = None,
-    about: Mapping[str, Any] | None = None,
+    progress: Progress = no_progress,
+    depends_on: Mapping[str, Any] | None = None,
+    held_out: Samples | None = None,
 ) -> None:
-    """Train a network, or go on where its training was, or take one that is finished.
+    """Train a network, or resume its training, or load one that is finished.
 
-    The folder then holds `weights.safetensors`, the averaged weights in float32, and `config.json`.
+    The folder is that of a run (`RunFolder`), whose result are the averaged weights in float32.
 
     Args:
         folder: made if need be.
-        module: the network as it begins. It is the result when this returns, on the processor, in
-            eval mode.
-        loss: what to make small.
-        draw: what to learn from.
+        module: the network with its initial weights. It has the trained ones when this returns, and
+            is on the processor, in eval mode.
+        loss: what is minimised.
+        sample_batch: what is learned from.
         config: how to train.
-        evaluate: measures the averaged weights; its figures go to TensorBoard.
-        tell: told how far it is.
-        about: what else the weights depend on, such as the network's settings and the data; for
-            JSON. A training goes on only where it is the same.
+        evaluate: measures the averaged weights; its metrics go to TensorBoard.
+        progress: told the updates that were done.
+        depends_on: what else the weights depend on, such as the network's settings and the data;
+            for JSON. A run is resumed only where it is the same.
+        held_out: samples that are not learned from, whose loss is measured as well.
 
     Raises:
-        InputError: the config or what is in the folder cannot be used; or the loss is no finite
-            number any more, and the checkpoint before that stays.
+        InputError: what is in the folder cannot be used.
+        TrainingDiverged: the loss is not a finite number any more; the checkpoint before stays.
         OSError: the folder cannot be written; the checkpoint before stays.
     """
     from accelerate import Accelerator
 
-    check_fit(config)
     # Precision is ours: that of `accelerate` changes the module for good.
     accelerator = Accelerator(mixed_precision="no")
-    whole = {**(about or {}), "fit": dataclasses.asdict(config)}
+    whole = {**(depends_on or {}), "trainer": dataclasses.asdict(config)}
     with ExitStack() as stack:
         if accelerator.is_main_process:
-            stack.enter_context(run_lock(folder))
-            FitFolder.open(folder, whole)
+            names = [f"trainer.{name}" for name in MAY_DIFFER]
+            stack.enter_context(RunFolder.open(folder, _KIND, whole, names))
         accelerator.wait_for_everyone()
-        there = FitFolder(folder)
-        if not there.finished:
+        run = RunFolder.load(folder)
+        if not run.has_result:
             learner = _Learner(module, config, accelerator)
-            # One core is for the batches that are drawn meanwhile: on two cores, two threads take
+            # One core is for the batches that are sampled meanwhile: on two cores, two threads take
             # nearly twice as long as one.
             with torch_threads(max(torch.get_num_threads() - 1, 1)):
-                _train(there, learner, loss, draw, evaluate, tell)
+                _train(run, learner, loss, sample_batch, evaluate, held_out, progress)
             accelerator.wait_for_everyone()
     # From the device where it was trained: what comes next has no need of one.
     load_weights(folder, module.to("cpu"))
@@ -112,7 +115,10 @@ def load_weights(folder: Path, module: nn.Module) -> None:
         InputError: nothing was trained to the end there, or a network of another shape, or the
             file is damaged.
     """
-    load_arrays(module, FitFolder(folder).weights()[0], folder)
+    run = RunFolder.load(folder)
+    if not run.has_result:
+        raise InputError(f"{folder}: this network is not trained to the end yet")
+    load_arrays(module, run.result()[0], folder)
     module.eval()
 
 
@@ -166,25 +172,21 @@ class _Learner:
         )
         self._low = config.bfloat16 and has_bfloat16(self._device)
 
-    def update(self, loss: Loss, drawn: Mapping[str, NDArray[Any]]) -> Tensor:
+    def update(self, loss: Loss, samples: Samples) -> Tensor:
         """Learn from a batch.
 
         Returns:
             (2,) the loss and the norm of its gradient, on the device.
         """
         rank, processes = self._accelerator.process_index, self._accelerator.num_processes
-        # Copied, for torch aligns its memory and numpy does not, which would show in last digits.
-        batch = {
-            name: torch.tensor(array[rank::processes]).to(self._device)
-            for name, array in drawn.items()
-        }
+        batch = self._batch({name: array[rank::processes] for name, array in samples.items()})
         noise = np.random.SeedSequence([self.config.seed, self.step, 1 + rank])
         torch.manual_seed(int(noise.generate_state(1)[0]))
         self._optimizer.param_groups[0]["lr"] = learning_rate(self.config, self.step)
         with torch.autocast(self._device.type, torch.bfloat16, enabled=self._low):
             value = loss(self._network, batch)
         self._accelerator.backward(value)
-        norm = self._accelerator.clip_grad_norm_(self._parameters, _GRADIENT_NORM)
+        norm = self._accelerator.clip_grad_norm_(self._parameters, _MAX_GRAD_NORM)
         self._optimizer.step()
         self._optimizer.zero_grad()
         self._average.step(self._parameters)
@@ -193,7 +195,7 @@ class _Learner:
 
     @contextmanager
     def averaged(self) -> Iterator[nn.Module]:
-        """The network with its averaged weights, to be looked at."""
+        """The network with its averaged weights, in eval mode, for a while."""
         self._average.store(self._parameters)
         self._average.copy_to(self._parameters)
         self.module.eval()
@@ -203,6 +205,16 @@ class _Learner:
         finally:
             self._average.restore(self._parameters)
             self.module.train()
+
+    def validation_loss(self, loss: Loss, samples: Samples) -> float:
+        """Loss of the averaged weights on samples, with the same random numbers each time."""
+        torch.manual_seed(0)
+        with self.averaged() as module:
+            return float(loss(module, self._batch(samples)))
+
+    def _batch(self, samples: Samples) -> Batch:
+        # Copied, for torch aligns its memory and numpy does not, which would show in last digits.
+        return {name: torch.tensor(array).to(self._device) for name, array in samples.items()}
 
     def arrays(self) -> Arrays:
         """Everything that is needed to go on, but for the step."""
@@ -244,99 +256,108 @@ class _Learner:
 
 
 def _train(
-    folder: FitFolder,
+    run: RunFolder,
     learner: _Learner,
     loss: Loss,
-    draw: Draw,
+    sample_batch: SampleBatch,
     evaluate: Evaluate | None,
-    tell: Tell | None,
+    held_out: Samples | None,
+    progress: Progress,
 ) -> None:
     config = learner.config
-    state = folder.state()
+    state = run.state()
     if state is not None:
-        learner.resume(*state, folder.path)
+        learner.resume(state.arrays, state.steps, run.path)
+
+    def measured() -> dict[str, float]:
+        metrics: dict[str, float] = {}
+        if held_out is not None:
+            metrics["trainer/validation_loss"] = learner.validation_loss(loss, held_out)
+        if evaluate is not None:
+            with learner.averaged() as module:
+                metrics |= evaluate(module)
+        return metrics
+
     since: list[Tensor] = []
     looked = saved = time.monotonic()
-    # For batches, and in all that is neither looking nor keeping.
+    # Seconds of waiting for batches, and of all but logging and writing.
     waited = spent = 0.0
     with ExitStack() as stack:
         log = None
         if learner.main:
-            log = stack.enter_context(closing(RunLog(folder.tensorboard, learner.step + 1)))
-        for drawn, asked in stack.enter_context(closing(_batches(draw, config, learner.step))):
+            log = stack.enter_context(closing(RunLog(run.tensorboard, learner.step + 1)))
+        batches = stack.enter_context(closing(_batches(sample_batch, config, learner.step)))
+        for samples, asked in batches:
             waited += time.monotonic() - asked
-            since.append(learner.update(loss, drawn))
+            since.append(learner.update(loss, samples))
             spent += time.monotonic() - asked
             now, last = time.monotonic(), learner.step == config.steps
             save = last or now - saved > config.checkpoint_seconds
             every = config.evaluate_every
-            measure = evaluate is not None and every and learner.step % every == 0 and not last
-            if not (save or measure or now - looked > _PAUSE):
+            measure = every and learner.step % every == 0 and not last
+            if not (save or measure or now - looked > _LOG_SECONDS):
                 continue
             # Before anything is kept.
-            figures = _look(since, learner.step) | {"fit/waited": waited / spent}
+            metrics = _look(since, learner.step) | {
+                "trainer/learning_rate": learning_rate(config, learner.step - 1),
+                "trainer/steps_per_second": len(since) / spent,
+                "trainer/waiting_share": waited / spent,
+            }
             since, looked, waited, spent = [], now, 0.0, 0.0
             if log is None:
                 continue
-            log.add(learner.step, figures)
-            if tell is not None:
-                tell(learner.step, config.steps, f"loss {figures['fit/loss']:.3g}")
+            log.add(learner.step, metrics)
+            remark = f"loss {metrics['trainer/loss']:.3g}"
+            progress("training", learner.step, config.steps, remark)
             if measure:
-                log.add(learner.step, _measure(learner, evaluate))
+                log.add(learner.step, measured())
             if save:
-                folder.checkpoint(learner.arrays(), learner.step)
+                run.checkpoint(learner.arrays(), learner.step)
                 saved = time.monotonic()
         if log is not None:
-            measured = _measure(learner, evaluate)
-            log.add(learner.step, measured)
+            final = measured()
+            log.add(learner.step, final)
             with learner.averaged() as module:
-                folder.finish(_arrays(module), measured)
+                run.keep_result(_arrays(module), final)
 
 
 def _batches(
-    draw: Draw, config: TrainerConfig, first: int
-) -> Generator[tuple[Mapping[str, NDArray[Any]], float], None, None]:
-    """The batch of each step from the first on, drawn while the one before is learned from.
+    sample_batch: SampleBatch, config: TrainerConfig, first: int
+) -> Generator[tuple[Samples, float], None, None]:
+    """The batch of each step from the first on, sampled while the one before is learned from.
 
     With each the time at which it was asked for.
     """
 
-    def drawn(step: int) -> Mapping[str, NDArray[Any]]:
-        return draw(np.random.default_rng([config.seed, step]), config.batch)
+    def samples(step: int) -> Samples:
+        return sample_batch(np.random.default_rng([config.seed, step]), config.batch)
 
     with ThreadPoolExecutor(1) as thread:
-        coming: deque[Future[Mapping[str, NDArray[Any]]]] = deque()
+        coming: deque[Future[Samples]] = deque()
         for step in range(first, config.steps + 1):
             asked = time.monotonic()
             if step < config.steps:
-                coming.append(thread.submit(drawn, step))
+                coming.append(thread.submit(samples, step))
             if step > first:
                 yield coming.popleft().result(), asked
 
 
 def _look(since: list[Tensor], step: int) -> dict[str, float]:
-    """Mean loss and gradient of the last updates, the latest of which is the step-th.
+    """Mean loss and gradient norm of the last updates, the latest of which is the step-th.
 
     Raises:
-        InputError: one is not a finite number.
+        TrainingDiverged: one is not a finite number.
     """
-    seen = torch.stack(since).cpu()
-    wrong = (~seen.isfinite()).any(dim=1).nonzero()
+    values = torch.stack(since).cpu()
+    wrong = (~values.isfinite()).any(dim=1).nonzero()
     if len(wrong):
         first = step - len(since) + 1 + int(wrong[0, 0])
-        raise InputError(
-            f"the loss or its gradient is no finite number at step {first}: "
-            "try a lower fit.learning-rate, in another folder"
+        raise TrainingDiverged(
+            f"the loss or its gradient is not a finite number at step {first}: "
+            "try a lower trainer.learning-rate, in another folder"
         )
-    loss, gradient = seen.mean(dim=0).tolist()
-    return {"fit/loss": loss, "fit/gradient_norm": gradient}
-
-
-def _measure(learner: _Learner, evaluate: Evaluate | None) -> dict[str, float]:
-    if evaluate is None:
-        return {}
-    with learner.averaged() as module:
-        return evaluate(module)
+    loss, gradient = values.mean(dim=0).tolist()
+    return {"trainer/loss": loss, "trainer/gradient_norm": gradient}
 
 
 def _arrays(module: nn.Module) -> Arrays:

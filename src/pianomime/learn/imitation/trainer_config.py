@@ -1,52 +1,46 @@
-"""How a network is trained. Cheap to import: no numpy, no torch."""
+"""Settings of the supervised training loop. Cheap to import: no numpy, no torch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pianomime.learn.runs.validation import above_zero, within
+from pianomime.validation import above_zero, within
 
 
 @dataclass(frozen=True)
 class TrainerConfig:
-    """Training by gradient descent (paper, appendix F and tables 7 and 8)."""
+    """Supervised training (paper, appendix F and tables 7 and 8)."""
 
     steps: int
-    """Updates, in all."""
+    """Number of updates in all."""
     batch: int = 256
-    """Samples in an update, on all GPUs together."""
+    """Number of samples in an update, on all GPUs together."""
     learning_rate: float = 1e-4
-    """At its highest; it falls to 0 at the last step, along a cosine."""
+    """Greatest learning rate, reached after the warm-up; a cosine takes it to 0 at the end."""
     weight_decay: float = 1e-6
-    """Of AdamW."""
+    """Weight decay of AdamW."""
     warmup: int = 500
-    """Steps in which the learning rate rises from 0."""
+    """Number of updates in which the learning rate rises linearly from 0."""
     ema_power: float = 0.75
-    """The result is an average of the weights, which forgets by 1 - (1 + step)^-power."""
+    """Power of the decay 1 - (1 + step)^-power of the weights' exponential moving average."""
     seed: int = 0
-    """Of everything that is drawn; the same seed gives the same weights."""
+    """Seed of all random numbers; the same seed gives the same weights."""
     bfloat16: bool = True
-    """Multiply in bfloat16, sum in float32, where the processor has instructions for that."""
+    """Multiply in bfloat16 and sum in float32, where the processor has instructions for it."""
     checkpoint_seconds: float = 60.0
-    """Between checkpoints [s]."""
+    """Time between checkpoints [s]."""
     evaluate_every: int = 0
-    """Steps between evaluations; 0 for only one, at the end."""
+    """Number of updates between evaluations; 0 for only one, at the end."""
+
+    def __post_init__(self) -> None:
+        for name in ("steps", "batch"):
+            within(f"trainer.{name}", getattr(self, name), 1)
+        for name in ("learning_rate", "ema_power"):
+            above_zero(f"trainer.{name}", getattr(self, name))
+        for name in ("weight_decay", "seed", "checkpoint_seconds", "evaluate_every"):
+            within(f"trainer.{name}", getattr(self, name), 0)
+        within("trainer.warmup", self.warmup, 0, self.steps - 1)
 
 
-FREE = ("checkpoint_seconds", "evaluate_every")
-"""What may be another when a training goes on: it does not change the weights."""
-
-
-def check_fit(config: TrainerConfig) -> None:
-    """Refuse settings out of range.
-
-    Raises:
-        InputError: the first of them, as it is called on the command line.
-    """
-    for name in ("steps", "batch"):
-        within(f"fit.{name}", getattr(config, name), 1)
-    for name in ("learning_rate", "ema_power"):
-        above_zero(f"fit.{name}", getattr(config, name))
-    for name in ("weight_decay", "seed", "checkpoint_seconds", "evaluate_every"):
-        within(f"fit.{name}", getattr(config, name), 0)
-    within("fit.warmup", config.warmup, 0, config.steps - 1)
+MAY_DIFFER = ("checkpoint_seconds", "evaluate_every")
+"""Settings that may be others when a run is resumed: they do not change the weights."""

@@ -1,221 +1,207 @@
-"""The folder of a run: what was trained on, how, how far it is, and what came out best."""
+"""The folder of a training run: its config, its last checkpoint, its result and its logs.
+
+Every training of the house, of experts and of networks, is such a folder. All files are written
+whole or not at all, so that a run that is killed at any instant is resumed from its checkpoint.
+"""
 
 from __future__ import annotations
 
+import copy
 import json
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pianomime.errors import InputError
 from pianomime.files import atomic, leftovers, sweep
-from pianomime.learn.expert.config import ExpertConfig, differences, from_json, to_json
+from pianomime.learn.runs.config_json import differences
+from pianomime.learn.runs.lock import run_lock
 from pianomime.learn.runs.safetensors_file import Arrays, read_tensors, write_tensors
-from pianomime.plan.demonstration import Demonstration
 
-VERSION = 1
+VERSION = 2
+"""Of the folder's files; version 1 had other names."""
 
-_ABOUT = "run.json"
-_SONG = "song.npz"
+_CONFIG = "run.json"
 _STATE = "state.safetensors"
-_BEST = "expert.safetensors"
-_CURVE = "curve.json"
-_FILES = (_ABOUT, _SONG, _STATE, _BEST, _CURVE)
+_RESULT = "result.safetensors"
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """How well a song is played after some training.
+class Checkpoint(NamedTuple):
+    """What a training goes on from.
 
     Attributes:
-        steps: control steps spent by then.
-        precision, recall, f1: of the deterministic performance.
+        arrays: weights, moments of optimizers and states of environments, by name.
+        steps: that were done by then.
+        metadata: anything else, as JSON.
     """
 
+    arrays: Arrays
     steps: int
-    precision: float
-    recall: float
-    f1: float
+    metadata: dict[str, Any]
 
 
-@dataclass(frozen=True)
 class RunFolder:
-    """A run, on disk.
+    """The folder of a training run.
 
     Attributes:
         path: of the folder.
-        song: what it is about, in an excerpt.
-        config: how it is trained.
-        start, seconds: the excerpt [s].
+        kind: what is trained, such as "expert" or "network".
+        config: everything that the result depends on, as JSON.
     """
 
-    path: Path
-    song: Demonstration
-    config: ExpertConfig
-    start: float
-    seconds: float
+    def __init__(self, path: Path, kind: str, config: dict[str, Any]) -> None:
+        self.path, self.kind, self.config = path, kind, config
 
     @classmethod
+    @contextmanager
     def open(
-        cls, path: Path, song: Demonstration, config: ExpertConfig, start: float, seconds: float
-    ) -> RunFolder:
-        """Begin a run, or go on with one of the same song and config.
+        cls,
+        path: Path,
+        kind: str,
+        config: Mapping[str, Any],
+        may_differ: Collection[str] = (),
+        more_files: Collection[str] = (),
+    ) -> Iterator[RunFolder]:
+        """Begin a run, or resume one of the same config; the folder is locked meanwhile.
 
-        Only the steps may be other ones: more of them prolong a run. What a kill or a full disk
-        left of one that was only being begun is begun anew. No other process may be writing here.
+        What a kill or a full disk left of files that were being written is removed.
+
+        Args:
+            path: of the folder; made if need be.
+            kind: what is trained.
+            config: everything that the result depends on; for JSON.
+            may_differ: names in the config, such as "trainer.evaluate_every", whose values may be
+                others than before; from now on those given hold.
+            more_files: names of other files that the caller writes into the folder.
 
         Raises:
-            InputError: the folder holds another run, or something else.
+            InputError: the folder holds another run or something else, or another process holds it.
             OSError: it cannot be written.
         """
-        if not (path / _ABOUT).exists():
-            if path.is_file():
-                raise InputError(f"{path}: is a file; a folder is needed")
-            path.mkdir(parents=True, exist_ok=True)
-            left = {file.name for file in path.iterdir()} - {*leftovers(path, _FILES)}
-            # The song comes first; another one of that name is somebody's.
-            if left and not (
-                left == {_SONG} and _same_song(Demonstration.load(path / _SONG), song)
-            ):
+        given: dict[str, Any] = json.loads(json.dumps(config))
+        files = (_CONFIG, _STATE, _RESULT, *more_files)
+        with run_lock(path):
+            if (path / _CONFIG).exists():
+                there = cls.load(path)
+                if there.kind != kind:
+                    raise InputError(
+                        f"{path}: holds a run that trains another kind of thing ({there.kind}, "
+                        f"not {kind}); name another folder"
+                    )
+                odd = differences(_without(there.config, may_differ), _without(given, may_differ))
+                if odd:
+                    raise InputError(
+                        f"{path}: holds a run with other settings ({', '.join(odd)}); "
+                        "name another folder"
+                    )
+            elif {file.name for file in path.iterdir()} - {*leftovers(path, files)}:
                 raise InputError(f"{path}: holds something else than a run; name another folder")
-            sweep(path, _FILES)
-            if not left:
-                song.save(path / _SONG)
-            run = cls(path, song, config, start, seconds)
-            run._write_about()
-            return run
-        there = cls.load(path)
-        if not _same_song(there.song, song):
-            raise InputError(f"{path}: holds a run on another song, {there.song.score.title}")
-        longer = replace(there.config, steps=config.steps)
-        if longer != config:
-            odd = ", ".join(differences(to_json(longer), to_json(config)))
-            raise InputError(
-                f"{path}: holds a run with other settings ({odd}); name another folder"
-            )
-        sweep(path, _FILES)
-        run = replace(there, config=config)
-        run._write_about()
-        return run
+            sweep(path, files)
+            run = cls(path, kind, given)
+            content = {"run_version": VERSION, "kind": kind, "config": given}
+            with atomic(path / _CONFIG) as temporary:
+                temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+            yield run
 
     @classmethod
     def load(cls, path: Path) -> RunFolder:
-        """A run that is there.
+        """A run that is there, to be read.
 
         Raises:
-            InputError: there is none, or one of another version.
+            InputError: there is none, it is damaged, or of another version.
         """
         try:
-            about = json.loads((path / _ABOUT).read_text(encoding="utf-8"))
-            version = about["run_version"]
+            content = json.loads((path / _CONFIG).read_text(encoding="utf-8"))
+            version = content["run_version"]
         except (FileNotFoundError, NotADirectoryError):
-            raise InputError(f"{path}: not the folder of a run (it has no {_ABOUT})") from None
+            raise InputError(f"{path}: not the folder of a run (it has no {_CONFIG})") from None
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{path / _ABOUT}: damaged, or not that of a run") from error
+            raise InputError(f"{path / _CONFIG}: damaged, or not that of a run") from error
         if version != VERSION:
             raise InputError(f"{path}: a run of version {version}; this program reads {VERSION}")
-        try:
-            start, seconds = float(about["start"]), float(about["seconds"])
-            config = from_json(ExpertConfig, about["config"])
-        except (KeyError, ValueError, TypeError) as error:
-            raise InputError(f"{path / _ABOUT}: {error}") from error
-        return cls(path, Demonstration.load(path / _SONG), config, start, seconds)
+        kind, config = content.get("kind"), content.get("config")
+        if not isinstance(kind, str) or not isinstance(config, dict):
+            raise InputError(f"{path / _CONFIG}: damaged, or not that of a run")
+        return cls(path, kind, config)
 
     @property
     def tensorboard(self) -> Path:
         """Folder of the logs."""
         return self.path / "tensorboard"
 
-    @property
-    def finished(self) -> bool:
-        """Whether all its steps were spent."""
-        return self.steps_done >= self.config.steps
-
-    @property
-    def steps_done(self) -> int:
-        """Control steps that were spent."""
-        curve = self.curve()
-        return curve[-1].steps if curve else 0
-
-    def curve(self) -> list[Evaluation]:
-        """All evaluations so far.
+    def state(self) -> Checkpoint | None:
+        """The last checkpoint; None before the first.
 
         Raises:
             InputError: the file is damaged.
         """
-        state = self.state()
-        return [] if state is None else [Evaluation(**row) for row in state[1]["curve"]]
+        path = self.path / _STATE
+        if not path.exists():
+            return None
+        arrays, content = read_tensors(path)
+        try:
+            return Checkpoint(arrays, int(content["steps"]), content["metadata"])
+        except (LookupError, ValueError, TypeError) as error:
+            raise InputError(f"{path}: damaged, or not the checkpoint of a run") from error
 
-    def state(self) -> tuple[Arrays, dict[str, Any]] | None:
-        """Arrays and facts to go on from; None before the first checkpoint.
+    def checkpoint(
+        self, arrays: Arrays, steps: int, metadata: Mapping[str, Any] | None = None
+    ) -> None:
+        """Keep everything that is needed to go on.
 
-        Raises:
-            InputError: the file is damaged.
-        """
-        return read_tensors(self.path / _STATE) if (self.path / _STATE).exists() else None
-
-    def best(self) -> tuple[Arrays, dict[str, Any]]:
-        """The best expert so far.
-
-        Raises:
-            InputError: there is none yet, or the file is damaged.
-        """
-        if not (self.path / _BEST).exists():
-            raise InputError(f"{self.path}: nothing was trained in this run yet")
-        return read_tensors(self.path / _BEST)
-
-    def keep_best(self, arrays: Arrays, evaluation: Evaluation) -> None:
-        """Keep an expert that is better than those before."""
-        write_tensors(self.path / _BEST, arrays, vars(evaluation))
-
-    def checkpoint(self, arrays: Arrays, about: dict[str, Any], curve: list[Evaluation]) -> None:
-        """Keep everything that is needed to go on, and the curve for people to read.
+        Args:
+            arrays: by name.
+            steps: that were done.
+            metadata: anything else, for JSON.
 
         Raises:
             OSError: the disk is full; the checkpoint before stays.
         """
-        rows = [vars(evaluation) for evaluation in curve]
-        write_tensors(self.path / _STATE, arrays, {**about, "curve": rows})
-        with atomic(self.path / _CURVE) as temporary:
-            temporary.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        content = {"steps": steps, "metadata": dict(metadata or {})}
+        write_tensors(self.path / _STATE, arrays, content)
 
-    def _write_about(self) -> None:
-        about = {
-            "run_version": VERSION,
-            "song": self.song.score.title,
-            "start": self.start,
-            "seconds": self.seconds,
-            "config": to_json(self.config),
-        }
-        with atomic(self.path / _ABOUT) as temporary:
-            temporary.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
+    @property
+    def has_result(self) -> bool:
+        """Whether there is a result."""
+        return (self.path / _RESULT).exists()
+
+    def result(self) -> tuple[Arrays, dict[str, Any]]:
+        """The result, and how it was measured.
+
+        Raises:
+            InputError: there is none yet, or the file is damaged.
+        """
+        if not self.has_result:
+            raise InputError(f"{self.path}: this run has no result yet")
+        return read_tensors(self.path / _RESULT)
+
+    def keep_result(self, arrays: Arrays, measured: Mapping[str, Any]) -> None:
+        """Keep the result in place of any before.
+
+        Args:
+            arrays: by name.
+            measured: what its evaluation gave, for JSON.
+
+        Raises:
+            OSError: the disk is full; the result before stays.
+        """
+        write_tensors(self.path / _RESULT, arrays, dict(measured))
 
 
 def is_run(path: Path) -> bool:
     """Whether a folder is that of a run."""
-    return (path / _ABOUT).is_file()
+    return (path / _CONFIG).is_file()
 
 
-def find_runs(path: Path) -> list[Path]:
-    """The run in a folder, or the runs with an expert in the folders below it, in order.
-
-    Raises:
-        InputError: there are none.
-    """
-    if is_run(path):
-        return [path]
-    found = sorted(about.parent for about in path.glob(f"*/{_ABOUT}"))
-    found = [folder for folder in found if (folder / _BEST).exists()]
-    if not found:
-        raise InputError(f"{path}: no run, nor a folder of runs with experts")
-    return found
-
-
-def _same_song(one: Demonstration, other: Demonstration) -> bool:
-    mine, theirs = one.plan, other.plan
-    return bool(
-        mine.fingertips.shape == theirs.fingertips.shape
-        and (mine.fingertips == theirs.fingertips).all()
-        and (mine.finger_key == theirs.finger_key).all()
-        and (one.score.roll() == other.score.roll()).all()
-    )
+def _without(config: dict[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """A config without the settings of these names, such as "trainer.evaluate_every"."""
+    left = copy.deepcopy(config)
+    for name in names:
+        *groups, last = name.split(".")
+        group: Any = left
+        for each in groups:
+            group = group.get(each) if isinstance(group, dict) else None
+        if isinstance(group, dict):
+            group.pop(last, None)
+    return left

@@ -1,7 +1,8 @@
-"""Training of the policy that learns all songs by trying, from songs to the file that is played."""
+"""Training of multi-task SAC, from MIDI files to the file that is played."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -16,113 +17,123 @@ from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
 from pianomime.errors import InputError
+from pianomime.files import files_digest
 from pianomime.keyboard import KEYS
 from pianomime.learn.envs.checkpoint_callback import ResumableCallback
 from pianomime.learn.envs.reference import load_score
 from pianomime.learn.envs.reward import press_reward
-from pianomime.learn.envs.sb3_multi_song import Played, Sb3MultiSongEnv
+from pianomime.learn.envs.sb3_multi_song import PlayedFrame, Sb3MultiSongEnv
 from pianomime.learn.imitation.export import export_network
-from pianomime.learn.imitation.normalizer import Scale
-from pianomime.learn.runs.fit_folder import FitFolder
+from pianomime.learn.imitation.normalizer import StandardNormalizer
 from pianomime.learn.runs.log import RunLog
+from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.safetensors_file import Arrays
-from pianomime.learn.runs.stage_folder import stage_folder
-from pianomime.learn.runs.tell import Tell
-from pianomime.learn.runs.validation import within
-from pianomime.learn.sac.config import SacConfig, check_sac
+from pianomime.learn.sac.config import SacConfig
 from pianomime.music import Score
-from pianomime.policies.features import CONTROLS, TIPS, holding, low_inputs
+from pianomime.policies.features import holding_controls, tracking_observation
 from pianomime.policies.horizon import CHUNK
+from pianomime.policies.policy import PolicyInfo
+from pianomime.progress import Progress, no_progress
 from pianomime.songs.find import find_songs
+from pianomime.validation import within
 from pianomime.world.hand import by_actuator, hand_points
+from pianomime.world.layout import LAYOUT, POINTS_SIZE
 
-STAGE = "multi-task-sac"
-STEPS = by_actuator(finger=0.3, wrist=0.3, slide=0.06)
-"""(46,) [rad, m] that an action of 1 sends an actuator away from where it is."""
-_SCALED_BY = 64
-"""Frames, in all worlds, from which the scale of what is seen is taken."""
-_CHECKPOINT = 50_000
-"""Frames between checkpoints, about; all that is remembered is in them."""
-_REMEMBERED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-_VECTOR = 108 + KEYS + TIPS
+NAME = "multi-task-sac"
+ACTION_SCALE = by_actuator(finger=0.3, wrist=0.3, slide=0.06)
+"""(46,) [rad, m] added for an action of 1 to the control that holds the present pose."""
+_NORMALIZER_STEPS = 64
+"""Control steps, in all environments, that the normalizer of observations is fitted to."""
+_CHECKPOINT_STEPS = 50_000
+"""Control steps between checkpoints, about; the whole replay buffer is in them."""
+_LOG_STEPS = 200
+"""Control steps of all environments whose mean reward is logged."""
+_BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+_GOAL_SIZE = CHUNK * KEYS
+_VECTOR_SIZE = 2 * LAYOUT.hands_size + KEYS + POINTS_SIZE
 _HIT = 0.5
+"""Share of the reward for goal keys; the rest is for no wrong key (paper, table 3)."""
 
 
 @dataclass(frozen=True, eq=False)
-class AskedSong:
-    """A song, of which nothing is known but what it asks for.
+class GoalSong:
+    """A song without fingertips: goals and pedal alone.
 
     Attributes:
-        goal: (T, 88) bool.
-        pedal: (T,) bool.
+        goal: (T, 88) bool, keys that should sound.
+        pedal: (T,) bool, the pedal of the score.
     """
 
     goal: NDArray[np.bool_]
     pedal: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, score: Score) -> AskedSong:
-        """What a score asks for."""
+    def of(cls, score: Score) -> GoalSong:
+        """The frames of a score."""
         return cls(score.roll(), score.pedal_roll())
 
 
 class SacVecEnv(Sb3MultiSongEnv):
-    """Both hands of a world are one agent, which sees what a policy of one stage sees.
+    """One agent in each world, with the observation of an end-to-end policy, flattened.
 
     Attributes:
-        scale: brings what is seen to a common size, once it is known.
+        normalizer: of the observations; None before it is fitted.
 
     Args:
-        songs: what is played.
-        config: how.
+        songs: songs to play.
+        config: number of worlds.
         threads: how many worlds step at the same time; 0 for one on each core.
     """
 
-    def __init__(self, songs: Sequence[AskedSong], config: SacConfig, threads: int = 0) -> None:
+    def __init__(self, songs: Sequence[GoalSong], config: SacConfig, threads: int = 0) -> None:
         silence = np.zeros((CHUNK, KEYS), bool)
-        self.scale: Scale | None = None
+        self.normalizer: StandardNormalizer | None = None
         self._goals = [np.vstack([song.goal, silence]) for song in songs]
-        self._holding = np.zeros((config.worlds, CONTROLS))
-        super().__init__(songs, config.worlds, 1, CHUNK * KEYS + _VECTOR, CONTROLS, threads)
+        self._holding = np.zeros((config.num_envs, LAYOUT.ctrl_size))
+        super().__init__(
+            songs, config.num_envs, 1, _GOAL_SIZE + _VECTOR_SIZE, LAYOUT.ctrl_size, threads
+        )
 
-    def see(self) -> NDArray[np.float32]:
-        """As `Sb3MultiSongEnv.see`."""
+    def agent_observations(self) -> NDArray[np.float32]:
+        """As `Sb3MultiSongEnv.agent_observations`."""
         joints = self.worlds.qpos_hands
-        self._holding = holding(joints)
+        self._holding = holding_controls(joints)
         goal = np.array([self._goals[song][at : at + CHUNK] for song, at in self.rows.tolist()])
         keys, velocities = self.worlds.key_state, self.worlds.qvel_hands
-        seen = low_inputs(goal, None, hand_points(joints), joints, velocities, keys, None)
-        told = np.concatenate([seen["goal"].reshape(len(joints), -1), seen["vector"]], axis=1)
-        if self.scale is not None:
-            told = self.scale(torch.from_numpy(told)).numpy()
-        return told[:, None]
+        parts = tracking_observation(
+            goal, None, hand_points(joints), joints, velocities, keys, None
+        )
+        flat = np.concatenate([parts["goal"].reshape(len(joints), -1), parts["vector"]], axis=1)
+        if self.normalizer is not None:
+            flat = self.normalizer(torch.from_numpy(flat)).numpy()
+        return flat[:, None]
 
-    def controls(self, said: NDArray[Any]) -> NDArray[np.float64]:
+    def controls(self, actions: NDArray[Any]) -> NDArray[np.float64]:
         """As `Sb3MultiSongEnv.controls`."""
-        ctrl: NDArray[np.float64] = self._holding + STEPS * said[:, 0]
+        ctrl: NDArray[np.float64] = self._holding + ACTION_SCALE * actions[:, 0]
         return ctrl
 
-    def rewards(self, played: Played, said: NDArray[Any]) -> NDArray[np.float64]:
-        """As `Sb3MultiSongEnv.rewards`: the paper's for keys; there are no fingertips to mimic."""
-        reward = press_reward(played.key_state, played.pressed, played.wanted, _HIT)
+    def rewards(self, played: PlayedFrame, actions: NDArray[Any]) -> NDArray[np.float64]:
+        """As `Sb3MultiSongEnv.rewards`: the paper's press term; there are no targets to mimic."""
+        reward = press_reward(played.key_state, played.pressed, played.goal, _HIT)
         return reward[:, None]
 
 
 class _Actor(nn.Module):
-    """The mean of what an actor does, as a policy of one stage is asked for it."""
+    """The mean action of a SAC actor, with the inputs and output of an end-to-end policy."""
 
-    steps: Tensor
+    action_scale: Tensor
 
-    def __init__(self, scale: Scale, actor: Any) -> None:
+    def __init__(self, normalizer: StandardNormalizer, actor: Any) -> None:
         super().__init__()
-        self.scale, self.body, self.mean = scale, actor.latent_pi, actor.mu
-        self.register_buffer("steps", torch.from_numpy(STEPS).float())
+        self.normalizer, self.body, self.mean = normalizer, actor.latent_pi, actor.mu
+        self.register_buffer("action_scale", torch.from_numpy(ACTION_SCALE).float())
 
     def forward(self, goal: Tensor, vector: Tensor) -> Tensor:
-        """(B, 1, 46) what is added to the controls that hold the pose."""
-        told = torch.cat([goal.flatten(1), vector], dim=1)
-        said = torch.tanh(self.mean(self.body(self.scale(told))))
-        return (self.steps * said)[:, None]
+        """(B, 1, 46) [rad, m] relative to the controls that hold the present pose."""
+        flat = torch.cat([goal.flatten(1), vector], dim=1)
+        action = torch.tanh(self.mean(self.body(self.normalizer(flat))))
+        return (self.action_scale * action)[:, None]
 
 
 def train_sac(
@@ -130,82 +141,80 @@ def train_sac(
     out: Path,
     config: SacConfig,
     threads: int = 0,
-    tell: Tell | None = None,
+    progress: Progress = no_progress,
 ) -> Path:
-    """Train, or go on where its training was; the result is `multi-task-sac.onnx` in the folder.
+    """Train multi-task SAC, or resume its training.
 
     Args:
         folders: of MIDI files.
-        out: folder.
-        config: how.
+        out: folder; `multi-task-sac.onnx` is the result, `multi-task-sac` holds the training.
+        config: how to train it.
         threads: of the physics; 0 for one on each core.
-        tell: told how far it is.
+        progress: told the frames that were played.
 
     Raises:
-        InputError: the config or a song cannot be used, or the folder holds another training.
+        InputError: a song cannot be used, or the folder holds another training.
         OSError: a file cannot be read or written.
     """
-    check_sac(config)
     within("threads", threads, 0)
     paths = find_songs(folders)
-    with stage_folder(out, STAGE, config, paths) as (folder, result):
-        if folder.finished and result.exists():
+    result = out / f"{NAME}.onnx"
+    content = {**dataclasses.asdict(config), "data": files_digest(paths)[:16]}
+    with RunFolder.open(out / NAME, "sac", content) as folder:
+        if folder.has_result and result.exists():
             return result
-        songs = [AskedSong.of(load_score(path, 0.0, config.seconds)) for path in paths]
+        songs = [GoalSong.of(load_score(path, 0.0, config.seconds)) for path in paths]
         env = SacVecEnv(songs, config, threads)
-        scale = env.scale = _scale(env, config.seed)
+        normalizer = env.normalizer = _fit_normalizer(env, config.seed)
         model = SAC(
             "MlpPolicy",
             env,
             learning_rate=config.learning_rate,
-            buffer_size=config.buffer,
-            learning_starts=config.first,
-            batch_size=config.batch,
-            gamma=config.discount,
-            gradient_steps=config.updates,
+            buffer_size=config.buffer_size,
+            learning_starts=config.learning_starts,
+            batch_size=config.batch_size,
+            gamma=config.gamma,
+            gradient_steps=config.gradient_steps,
             policy_kwargs={"net_arch": list(config.hidden)},
             seed=config.seed,
             device="cpu",
         )
         model.set_logger(Logger(None, []))
         state = folder.state()
-        since = 1 if state is None else state[1] + 1
+        since = 1 if state is None else state.steps + 1
         with closing(RunLog(folder.tensorboard, since)) as log:
-            boundary = _Boundary(folder, env, config, log, tell)
-            boundary.learn(model, config.frames, state, folder.path)
-        actor = _Actor(scale, model.policy.actor).eval()
-        about = {
-            "stage": STAGE,
-            "level": "whole",
-            "prior": False,
-            "network": "mlp",
-            "chunk": 1,
-            "width": CONTROLS,
+            callback = _Callback(folder, env, config, log, progress)
+            callback.learn(model, config.total_steps, state, folder.path)
+        actor = _Actor(normalizer, model.policy.actor).eval()
+        info = PolicyInfo(NAME, "end-to-end", "mlp", LAYOUT.ctrl_size, data=content["data"])
+        example = {
+            "goal": torch.zeros(2, CHUNK, KEYS),
+            "vector": torch.zeros(2, _VECTOR_SIZE),
         }
-        given = (torch.zeros(2, CHUNK, KEYS), torch.zeros(2, _VECTOR))
         weights = {name: tensor.numpy().copy() for name, tensor in actor.state_dict().items()}
-        # One of another training is not to be taken for this one if the export fails.
+        # A file of another training must not be taken for the result if the export fails.
         result.unlink(missing_ok=True)
-        folder.finish(weights, {})
-        export_network(actor, given, ["goal", "vector"], ["said"], about, result)
+        folder.keep_result(weights, {})
+        export_network(actor, example, ["action"], info, result)
     return result
 
 
-class _Boundary(ResumableCallback):
-    """Tells how far it is and how much reward there was, and writes a checkpoint now and then."""
+class _Callback(ResumableCallback):
+    """Logs the reward, and writes a checkpoint now and then."""
 
     def __init__(
         self,
-        folder: FitFolder,
+        folder: RunFolder,
         env: SacVecEnv,
         config: SacConfig,
         log: RunLog,
-        tell: Tell | None,
+        progress: Progress,
     ) -> None:
-        # Whole frames of all worlds.
-        super().__init__(env, config.seed, -(-_CHECKPOINT // config.worlds) * config.worlds)
+        # A multiple of the number of environments.
+        steps = -(-_CHECKPOINT_STEPS // config.num_envs) * config.num_envs
+        super().__init__(env, config.seed, steps)
         self._folder, self._config = folder, config
-        self._log, self._tell = log, tell
+        self._log, self._progress = log, progress
         self._rewards: list[float] = []
 
     @property
@@ -214,16 +223,16 @@ class _Boundary(ResumableCallback):
         return self.model
 
     def arrays(self) -> Arrays:
-        """As `ResumableCallback.arrays`, with all frames that are remembered."""
-        model, kept = self._learner, self._learner.replay_buffer
-        assert kept is not None
+        """As `ResumableCallback.arrays`, with the replay buffer."""
+        model, buffer = self._learner, self._learner.replay_buffer
+        assert buffer is not None
         assert model.log_ent_coef is not None
         arrays = super().arrays()
-        for name in _REMEMBERED:
-            whole = getattr(kept, name)
-            arrays[f"buffer/{name}"] = whole if kept.full else whole[: kept.pos]
+        for name in _BUFFER:
+            whole = getattr(buffer, name)
+            arrays[f"buffer/{name}"] = whole if buffer.full else whole[: buffer.pos]
         return arrays | {
-            "buffer/next": np.array(kept.pos),
+            "buffer/next": np.array(buffer.pos),
             "temperature/log": model.log_ent_coef.detach().numpy(),
         }
 
@@ -240,50 +249,51 @@ class _Boundary(ResumableCallback):
     def resume(self, arrays: Arrays, steps: int, path: Path) -> None:
         """As `ResumableCallback.resume`."""
         super().resume(arrays, steps, path)
-        model, kept = self._learner, self._learner.replay_buffer
-        assert kept is not None
+        model, buffer = self._learner, self._learner.replay_buffer
+        assert buffer is not None
         assert model.log_ent_coef is not None
         try:
-            for name in _REMEMBERED:
+            for name in _BUFFER:
                 rows = arrays[f"buffer/{name}"]
-                getattr(kept, name)[: len(rows)] = rows
-            kept.pos = int(arrays["buffer/next"])
+                getattr(buffer, name)[: len(rows)] = rows
+            buffer.pos = int(arrays["buffer/next"])
             model.log_ent_coef.data.copy_(torch.from_numpy(arrays["temperature/log"]))
         except (LookupError, ValueError, RuntimeError) as error:
             raise InputError(f"{path}: the checkpoint does not fit the config") from error
-        kept.full = len(rows) == kept.buffer_size
+        buffer.full = len(rows) == buffer.buffer_size
 
-    def keep(self, update: int, steps: int) -> None:
-        """As `ResumableCallback.keep`."""
+    def save(self, update: int, steps: int) -> None:
+        """As `ResumableCallback.save`."""
         self._rewards = []
         if update:
             self._folder.checkpoint(self.arrays(), steps)
 
     def _on_rollout_start(self) -> None:
-        # For SAC every frame is a rollout of its own.
+        # In SAC every control step is a rollout of its own.
         if self.model.num_timesteps % self._steps_per_update == 0:
             self.between_updates()
 
     def _on_step(self) -> bool:
         self._rewards.append(float(self.locals["rewards"].mean()))
-        if len(self._rewards) == 200:
+        if len(self._rewards) == _LOG_STEPS:
             mean = float(np.mean(self._rewards))
             self._rewards = []
-            self._log.add(self.num_timesteps, {"sac/reward": mean})
-            if self._tell is not None:
-                done = min(self.num_timesteps, self._config.frames)
-                self._tell(done, self._config.frames, f"reward {mean:.3f}")
+            self._log.add(self.num_timesteps, {"rollout/reward": mean})
+            done = min(self.num_timesteps, self._config.total_steps)
+            self._progress("training", done, self._config.total_steps, f"reward {mean:.3f}")
         return True
 
 
-def _scale(env: SacVecEnv, seed: int) -> Scale:
-    """What is usual, of worlds in which something is done by chance."""
-    draw = np.random.default_rng(seed)
+def _fit_normalizer(env: SacVecEnv, seed: int) -> StandardNormalizer:
+    """The normalizer of observations, fitted to a rollout of random actions."""
+    rng = np.random.default_rng(seed)
     env.reset()
-    shape = (env.num_envs, CONTROLS)
-    seen = [np.asarray(env.play(draw.uniform(-1, 1, shape))[0]) for _ in range(_SCALED_BY)]
-    scale = Scale(CHUNK * KEYS + _VECTOR)
-    scale.fit(np.concatenate(seen))
-    # Keys that nobody happened to want are not unlike others.
-    scale.middle[: CHUNK * KEYS], scale.spread[: CHUNK * KEYS] = 0.0, 1.0
-    return scale
+    shape = (env.num_envs, LAYOUT.ctrl_size)
+    observations = [
+        np.asarray(env.step_frame(rng.uniform(-1, 1, shape))[0]) for _ in range(_NORMALIZER_STEPS)
+    ]
+    normalizer = StandardNormalizer(_GOAL_SIZE + _VECTOR_SIZE)
+    normalizer.fit(np.concatenate(observations))
+    # Goals stay as they are: keys that did not occur in these songs are like all others.
+    normalizer.mean[:_GOAL_SIZE], normalizer.std[:_GOAL_SIZE] = 0.0, 1.0
+    return normalizer

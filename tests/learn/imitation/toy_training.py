@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from pianomime.learn.imitation.trainer import Batch, fit
+from pianomime.learn.imitation.trainer import Batch, train_network
 from pianomime.learn.imitation.trainer_config import TrainerConfig
 
 CONFIG = TrainerConfig(
@@ -26,7 +26,7 @@ def network(wide: int = 16) -> nn.Module:
     )
 
 
-def draw(rng: np.random.Generator, batch: int) -> dict[str, np.ndarray]:
+def sample_batch(rng: np.random.Generator, batch: int) -> dict[str, np.ndarray]:
     x = rng.uniform(-1, 1, (batch, 1)).astype(np.float32)
     return {"x": x, "y": np.sin(3 * x)}
 
@@ -47,7 +47,8 @@ def train(
     folder: Path, config: TrainerConfig = CONFIG, wide: int = 16, **change: Callable[..., Any] | Any
 ) -> nn.Module:
     module = network(wide)
-    fit(folder, module, **{"loss": loss, "draw": draw, "config": config, **change})
+    settings = {"loss": loss, "sample_batch": sample_batch, "config": config, **change}
+    train_network(folder, module, **settings)
     return module
 
 
