@@ -10,23 +10,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pianomime.learn.data.clips import Clips
-from pianomime.learn.expert.config import (
-    EnvConfig,
-    EpisodeConfig,
-    ExpertConfig,
-    ObservationConfig,
-    PpoConfig,
-    TrajectorySearchConfig,
-)
+from pianomime.learn.data.dataset import Dataset
+from pianomime.learn.envs.config import EnvConfig, EpisodeConfig, ObservationConfig
+from pianomime.learn.expert.config import ExpertConfig, PpoConfig, TrajectorySearchConfig
 from pianomime.learn.runs import safetensors_file
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.plan.demonstration import Demonstration
-from pianomime.policies.features import rest_tips
+from pianomime.policies.features import rest_points
 
 SMALL = PpoConfig(
-    envs=4, steps_per_update=128, batch=64, epochs=2, hidden=(32, 16), learning_rate=1e-3
+    num_envs=4,
+    steps_per_update=128,
+    batch_size=64,
+    n_epochs=2,
+    hidden=(32, 16),
+    learning_rate=1e-3,
 )
 
 
@@ -46,7 +45,7 @@ def two_notes() -> Demonstration:
 
 @pytest.fixture(scope="session")
 def shallow(two_notes: Demonstration) -> Demonstration:
-    """The same, but for a plan whose fingers stop short: the prior alone presses nothing."""
+    """The same with a plan whose fingers stop short: the base controller presses nothing."""
     fingertips = two_notes.plan.fingertips.copy()
     fingertips[:, :, 1:, 2][two_notes.plan.finger_key >= 0] = 0.03
     plan = FingertipPlan(
@@ -61,19 +60,19 @@ def shallow(two_notes: Demonstration) -> Demonstration:
 @pytest.fixture
 def small_ppo() -> ExpertConfig:
     """Three updates of a small network."""
-    return ExpertConfig(method="ppo", steps=384, ppo=SMALL)
+    return ExpertConfig(method="ppo", total_steps=384, ppo=SMALL)
 
 
 @pytest.fixture
 def small_search() -> ExpertConfig:
     """A few passes that try little."""
     search = TrajectorySearchConfig(variations=4, rounds=1, ahead=6)
-    return ExpertConfig(method="search", steps=600, env=EnvConfig(prior="ik"), search=search)
+    return ExpertConfig(method="search", total_steps=600, env=EnvConfig(base="ik"), search=search)
 
 
 @pytest.fixture
-def every_part() -> EnvConfig:
-    """All parts of an observation, episodes that begin anywhere and are cut short."""
+def every_term() -> EnvConfig:
+    """All terms of an observation, episodes that begin anywhere and are truncated."""
     seen = ObservationConfig(goal=3, fingertips=2, errors=True, time=True)
     return EnvConfig(observation=seen, episode=EpisodeConfig(start="anywhere", frames=7))
 
@@ -98,20 +97,20 @@ def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[], AbstractContextMa
 
 
 @pytest.fixture
-def clips() -> Clips:
+def clips() -> Dataset:
     """Three clips of 30, 7 and 20 frames, the first two of one song; every frame is another."""
     draw = np.random.default_rng(0)
     frames = 57
     goal = np.zeros((frames, 88), bool)
     goal[np.arange(frames), 20 + np.arange(frames) % 40] = True
-    return Clips(
+    return Dataset(
         {
             "goal": goal,
-            "fingertips": (rest_tips() + draw.normal(0, 0.02, (frames, 2, 6, 3))).astype("f4"),
+            "fingertips": (rest_points() + draw.normal(0, 0.02, (frames, 2, 6, 3))).astype("f4"),
             "joints": draw.normal(0, 0.1, (frames, 54)).astype("f4"),
             "velocities": draw.normal(0, 1, (frames, 54)).astype("f4"),
             "keys": np.where(goal, 0.5, 0.0).astype("f4"),
-            "prior": draw.normal(0, 0.1, (frames, 46)).astype("f4"),
+            "base_control": draw.normal(0, 0.1, (frames, 46)).astype("f4"),
             "action": draw.normal(0, 0.1, (frames, 46)).astype("f4"),
         },
         np.array([30, 37, 57]),

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from pianomime.cli import main
-from pianomime.learn.runs.run import RunFolder
+from pianomime.learn.expert.expert_run import ExpertRun
 from pianomime.plan.demonstration import Demonstration
 
-QUICK = ["--steps", "200", "--search.variations", "4", "--search.rounds", "1"]
+QUICK = ["--total-steps", "200", "--search.variations", "4", "--search.rounds", "1"]
 
 
 @pytest.fixture(autouse=True)
@@ -33,10 +33,10 @@ def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_an_expert_is_trained_and_plays(capsys: pytest.CaptureFixture[str]) -> None:
     main(["train-expert", "demo.npz", "--preset", "best", "-o", "run", *QUICK])
-    config = RunFolder.load(Path("run")).config
+    config = ExpertRun.load(Path("run")).config
     # What was asked for, and for the rest the preset.
-    assert (config.method, config.env.prior) == ("search", "dynamic")
-    assert (config.steps, config.search.variations) == (200, 4)
+    assert (config.method, config.env.base) == ("search", "dynamic")
+    assert (config.total_steps, config.search.variations) == (200, 4)
     told = capsys.readouterr().out
     assert "pianomime play demo.npz --player run" in told
     main(["play", "demo.npz", "--player", "run", "--no-video", "-o", "report"])
@@ -54,14 +54,14 @@ def test_an_expert_is_trained_and_plays(capsys: pytest.CaptureFixture[str]) -> N
 def test_a_bundled_song_needs_no_demonstration() -> None:
     quick = [*QUICK, "--method", "search", "--seconds", "2"]
     main(["train-expert", "ode-to-joy", *quick])
-    run = RunFolder.load(Path("out/expert-ode-to-joy-paper"))
+    run = ExpertRun.load(Path("out/expert-ode-to-joy-paper"))
     assert run.song.source == "zero-shot plan"
     main(["play", "ode-to-joy", "--player", str(run.path), "--no-video", "-o", "report"])
 
 
 def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "paper, best" in fails(["train-expert", "demo.npz", "--preset", "worst"], capsys)
-    assert "steps" in fails(["train-expert", "demo.npz", "--steps", "0"], capsys)
+    assert "total-steps" in fails(["train-expert", "demo.npz", "--total-steps", "0"], capsys)
     assert "no such file" in fails(["train-expert", "nothing.mid"], capsys)
     assert "No such file" in fails(["train-expert", "nothing.npz"], capsys)
     assert "a second" in fails(["train-expert", "demo.npz", "--seconds", "0.2"], capsys)

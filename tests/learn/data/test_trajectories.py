@@ -12,8 +12,9 @@ import zarr
 
 from pianomime.commands.collect import Collect
 from pianomime.errors import InputError
-from pianomime.learn.data.episode import COLUMNS, Episode, published_episodes, world_order
-from pianomime.learn.data.trajectories import ExpertData, write_expert_data
+from pianomime.learn.data.episode import COLUMNS, Episode
+from pianomime.learn.data.published import published_episodes, world_order
+from pianomime.learn.data.trajectories import VERSION, TrajectoryData, write_trajectories
 from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert import load_expert, train_expert
 from pianomime.learn.expert.expert_run import find_expert_runs
@@ -37,7 +38,7 @@ def runs(
 def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "experts.zarr"
     Collect((runs,), out).run()
-    data = ExpertData.open(out)
+    data = TrajectoryData.open(out)
     assert len(data) == 2
     for number, folder in enumerate(find_expert_runs(runs)):
         player, run = load_expert(folder)
@@ -48,7 +49,7 @@ def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
         np.testing.assert_array_equal(columns["pressed"], performance.pressed)
         np.testing.assert_allclose(columns["action"], performance.ctrl, atol=1e-6)
         np.testing.assert_allclose(
-            columns["prior"] + columns["residual"], columns["action"], atol=1e-6
+            columns["base_control"] + columns["residual"], columns["action"], atol=1e-6
         )
         np.testing.assert_allclose(columns["joints"][1:], performance.qpos[:-1, 88:], atol=1e-6)
         np.testing.assert_allclose(columns["keys"][1:], performance.key_state[:-1], atol=1e-6)
@@ -66,11 +67,11 @@ def test_it_reads_in_a_few_lines(runs: Path, tmp_path: Path) -> None:
     assert lengths == np.diff(ends, prepend=0).tolist()
     for name, column in COLUMNS.items():
         assert data[name].shape == (ends[-1], *column.shape)
-        assert data[name].attrs["about"] == column.about
+        assert data[name].attrs["description"] == column.description
     # A data set is replaced; anything else is not.
     Collect((runs / "a",), out).run()
-    assert len(ExpertData.open(out)) == 1
-    with pytest.raises(InputError, match="not an expert data set"):
+    assert len(TrajectoryData.open(out)) == 1
+    with pytest.raises(InputError, match="not a data set of trajectories"):
         Collect((runs,), runs).run()
 
 
@@ -82,9 +83,9 @@ def test_what_fails_leaves_the_older_data(
     (runs / "b" / "result.safetensors").write_bytes(b"cut")
     with pytest.raises(InputError, match="damaged"):
         Collect((runs,), out).run()
-    assert len(ExpertData.open(out)) == 2
+    assert len(TrajectoryData.open(out)) == 2
     with pytest.raises(InputError, match="no episodes"):
-        write_expert_data(out, iter(()))
+        write_trajectories(out, iter(()))
     replace = os.replace
 
     def fails(source: str | Path, target: str | Path) -> None:
@@ -93,12 +94,12 @@ def test_what_fails_leaves_the_older_data(
             raise OSError("cannot be moved")
         replace(source, target)
 
-    episode = ExpertData.open(out).episode(0)
+    episode = TrajectoryData.open(out).episode(0)
     with monkeypatch.context() as patch:
         patch.setattr("pianomime.learn.data.trajectories.os.replace", fails)
         with pytest.raises(OSError, match="cannot be moved"):
-            write_expert_data(out, iter([episode]))
-    assert len(ExpertData.open(out)) == 2
+            write_trajectories(out, iter([episode]))
+    assert len(TrajectoryData.open(out)) == 2
 
 
 @pytest.mark.parametrize(
@@ -142,7 +143,7 @@ def test_published_experts_come_into_the_same_form(tmp_path: Path) -> None:
     published(tmp_path, joints, ctrl, keys)
     out = tmp_path / "experts.zarr"
     Collect((tmp_path / "experts.npz",), out, tmp_path / "demonstrations.npz").run()
-    episode = ExpertData.open(out).episode(0)
+    episode = TrajectoryData.open(out).episode(0)
     assert (episode.name, episode.song, episode.split) == ("clip007", -1, "train")
     with np.load(tmp_path / "demonstrations.npz") as file:
         marks = {"song_group": [4, 9], "split": ["train", "train"], "odd": [False, True]}
@@ -165,22 +166,22 @@ def test_published_experts_come_into_the_same_form(tmp_path: Path) -> None:
 def test_a_damaged_data_set_is_one_line(two_notes: Demonstration, tmp_path: Path) -> None:
     columns = {name: np.ones((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
     out = tmp_path / "experts.zarr"
-    write_expert_data(out, iter([Episode("one", 0.0, "ik", columns)]))
+    write_trajectories(out, iter([Episode("one", 0.0, "ik", columns)]))
     chunk = next(file for file in (out / "joints" / "c").rglob("*") if file.is_file())
     chunk.write_bytes(chunk.read_bytes()[: chunk.stat().st_size // 2])
     with pytest.raises(InputError, match="damaged"):
-        ExpertData.open(out).episode(0)
+        TrajectoryData.open(out).episode(0)
     zarr.open_group(str(out)).attrs["episodes"] = [{"name": "one"}]
     with pytest.raises(InputError, match="damaged"):
-        ExpertData.open(out)
+        TrajectoryData.open(out)
     for ends in (np.zeros(0, int), np.array([[4]]), np.array([np.nan]), np.array([4, 4])):
         zarr.open_group(str(out)).create_array("episode_end", data=ends, overwrite=True)
         with pytest.raises(InputError, match="damaged"):
-            ExpertData.open(out)
+            TrajectoryData.open(out)
     for file, text in (("goal/zarr.json", '{"zarr'), ("zarr.json", "[]")):
         (out / file).write_text(text)
-        with pytest.raises(InputError, match=r"damaged|not an expert"):
-            ExpertData.open(out)
+        with pytest.raises(InputError, match=r"damaged|not a data set"):
+            TrajectoryData.open(out)
 
 
 def test_published_files_of_another_shape(tmp_path: Path) -> None:
@@ -200,7 +201,7 @@ def test_published_files_of_another_shape(tmp_path: Path) -> None:
         next(published_episodes(tmp_path / "none.npz", tmp_path / "other.npz"))
 
 
-def test_published_priors_are_near_the_recorded_actions(shared: Path) -> None:
+def test_published_base_controls_are_near_the_recorded_actions(shared: Path) -> None:
     folder = shared / "data" / "pianomime"
     read = published_episodes(folder / "experts.npz", folder / "demonstrations.npz")
     episode, total = next(read)
@@ -212,3 +213,13 @@ def test_published_priors_are_near_the_recorded_actions(shared: Path) -> None:
     keys = episode.columns["keys"] * key_travel()
     assert keys.shape[1] == 88
     assert world_order(np.arange(54.0)[None])[0, :3].tolist() == [51.0, 52.0, 53.0]
+
+
+def test_a_data_set_of_an_older_version_is_one_line(tmp_path: Path) -> None:
+    columns = {name: np.ones((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    out = tmp_path / "experts.zarr"
+    write_trajectories(out, iter([Episode("one", 0.0, "ik", columns)]))
+    zarr.open_group(str(out)).attrs["version"] = VERSION - 1
+    with pytest.raises(InputError, match="collect it again") as error:
+        TrajectoryData.open(out)
+    assert "\n" not in str(error.value)

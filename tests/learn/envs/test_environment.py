@@ -1,9 +1,10 @@
-"""The environments: both libraries' checkers, what is seen, and that they are one and the same."""
+"""The environments: the libraries' checkers, observations, and that one and many are the same."""
 
 from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Callable
 
 import gymnasium
 import numpy as np
@@ -14,37 +15,42 @@ from numpy.typing import NDArray
 from stable_baselines3.common.env_checker import check_env as sb3_check
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
-import pianomime.learn
+from pianomime.errors import InputError
 from pianomime.learn.envs.batch import SongBatch
-from pianomime.learn.envs.observation import Observer, parts
+from pianomime.learn.envs.config import (
+    EnvConfig,
+    EpisodeConfig,
+    ObservationConfig,
+    preset_env,
+)
+from pianomime.learn.envs.observation import Observer, default_observation_terms
 from pianomime.learn.envs.sb3_env import Sb3Env
-from pianomime.learn.expert.config import EnvConfig, EpisodeConfig, ObservationConfig, preset_config
+from pianomime.learn.expert.config import preset_config
 from pianomime.music import frame_metrics
 from pianomime.plan.demonstration import Demonstration
 from pianomime.track import DynamicTracker, IkTracker
 from pianomime.world import World
 
-assert pianomime.learn
+ENV = "pianomime.learn:pianomime/Song-v0"
 
 
 def actions(steps: int, envs: int, size: int = 46, seed: int = 0) -> NDArray[np.float32]:
-    draw = np.random.default_rng(seed)
-    return draw.uniform(-1, 1, (steps, envs, size)).astype(np.float32)
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1, 1, (steps, envs, size)).astype(np.float32)
 
 
 @pytest.mark.parametrize("preset", ["paper", "best"])
 def test_both_checkers_pass(two_notes: Demonstration, preset: str) -> None:
-    env = gymnasium.make("pianomime/Song-v0", demonstration=two_notes, config=preset)
+    env = gymnasium.make(ENV, demonstration=two_notes, config=preset)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=".*Box observation space.*")
-        gymnasium_check(env.unwrapped)
+        # Pictures need OpenGL, and have a test of their own.
+        gymnasium_check(env.unwrapped, skip_render_check=True)
         sb3_check(env.unwrapped)
 
 
 def test_vector_forms_work_with_the_libraries_wrappers(two_notes: Demonstration) -> None:
-    envs = RecordEpisodeStatistics(
-        gymnasium.make_vec("pianomime/Song-v0", num_envs=3, demonstration=two_notes)
-    )
+    envs = RecordEpisodeStatistics(gymnasium.make_vec(ENV, num_envs=3, demonstration=two_notes))
     seen, _ = envs.reset(seed=1)
     assert envs.observation_space.contains(seen)
     frames = len(two_notes.plan)
@@ -68,15 +74,12 @@ def test_vector_forms_work_with_the_libraries_wrappers(two_notes: Demonstration)
 
 
 def test_many_are_each_what_one_is_bit_for_bit(
-    two_notes: Demonstration, every_part: EnvConfig
+    two_notes: Demonstration, every_term: EnvConfig
 ) -> None:
-    config = dataclasses.replace(every_part, episode=EpisodeConfig())
+    config = dataclasses.replace(every_term, episode=EpisodeConfig())
     many = SongBatch(two_notes, config, 3)
     many.reset(np.random.default_rng(0))
-    alone = [
-        gymnasium.make("pianomime/Song-v0", demonstration=two_notes, config=config)
-        for _ in range(3)
-    ]
+    alone = [gymnasium.make(ENV, demonstration=two_notes, config=config) for _ in range(3)]
     for row, env in enumerate(alone):
         seen, _ = env.reset(seed=0)
         assert (seen == many.observations[row]).all()
@@ -90,26 +93,26 @@ def test_many_are_each_what_one_is_bit_for_bit(
             assert info["f1"] == step.f1[row]
 
 
-@pytest.mark.parametrize("prior", ["ik", "dynamic"])
-def test_no_residual_is_the_prior_alone(two_notes: Demonstration, prior: str) -> None:
-    batch = SongBatch(two_notes, EnvConfig(prior=prior), 1)  # type: ignore[arg-type]
+@pytest.mark.parametrize("base", ["ik", "dynamic"])
+def test_no_residual_is_the_base_controller_alone(two_notes: Demonstration, base: str) -> None:
+    batch = SongBatch(two_notes, EnvConfig(base=base), 1)  # type: ignore[arg-type]
     batch.reset(np.random.default_rng(0))
-    tracker, world = {"ik": IkTracker, "dynamic": DynamicTracker}[prior](), World()
-    tracker.begin(two_notes.plan)
+    world = World()
+    controller = {"ik": IkTracker, "dynamic": DynamicTracker}[base]().start(two_notes.plan)
     pressed = []
     for frame in range(len(two_notes.plan)):
         step = batch.step(np.zeros((1, 46)))
-        world.step(tracker.control(frame, world), False)
+        world.step(controller.control(frame, world), False)
         pressed.append(world.pressed)
         assert (batch.state()["worlds"][0] == world.state()).all()
     assert step.f1[0] == pytest.approx(frame_metrics(two_notes.score.roll(), pressed).f1)
 
 
 def test_residuals_are_a_share_of_the_ranges(two_notes: Demonstration) -> None:
-    seen = ObservationConfig(prior=True)
+    seen = ObservationConfig(base_control=True)
     batch = SongBatch(two_notes, EnvConfig(observation=seen), 2)
     batch.reset(np.random.default_rng(0))
-    prior = batch.observations[0, batch.observer.slices["prior"]].astype(float)
+    base = batch.observations[0, batch.observer.slices["base_control"]].astype(float)
     model = World().model
     low, high = model.actuator_ctrlrange.T
     action = np.vstack([np.ones(46), np.full(46, -7.0)])  # beyond -1 counts as -1
@@ -120,21 +123,21 @@ def test_residuals_are_a_share_of_the_ranges(two_notes: Demonstration) -> None:
     for state in batch.state()["worlds"]:
         world.set_state(state)
         sent.append(world.data.ctrl.copy())
-    proposed = (low + high) / 2 + prior * (high - low) / 2
+    proposed = (low + high) / 2 + base * (high - low) / 2
     np.testing.assert_allclose(sent[0], proposed + 0.03 * (high - low), atol=1e-6)
     np.testing.assert_allclose(sent[1], proposed - 0.03 * (high - low), atol=1e-6)
 
 
-def test_observations_are_laid_out_as_told(two_notes: Demonstration) -> None:
+def test_observations_are_laid_out_as_documented(two_notes: Demonstration) -> None:
     config = ObservationConfig(goal=3, fingertips=2, errors=True, time=True)
-    sizes = {part.name: part.size for part in parts(config)}
+    sizes = {term.name: term.size for term in default_observation_terms(config)}
     assert sizes == {
         "joints": 54,
         "velocities": 54,
         "keys": 88,
         "goal": 264,
         "fingertips": 72,
-        "prior": 46,
+        "base_control": 46,
         "pedal": 1,
         "errors": 30,
         "time": 1,
@@ -153,21 +156,20 @@ def test_observations_are_laid_out_as_told(two_notes: Demonstration) -> None:
         if frame:
             assert seen["pedal"] == pedal[frame - 1]
         ahead = two_notes.plan.fingertips[np.minimum([frame, frame + 1], frames - 1)]
-        told = seen["fingertips"].reshape(2, 2, 6, 3) * [0.15, 0.6, 0.06] + [0.03, 0.0, 0.03]
-        np.testing.assert_allclose(told, ahead, atol=1e-6)
+        targets = seen["fingertips"].reshape(2, 2, 6, 3) * [0.15, 0.6, 0.06] + [0.03, 0.0, 0.03]
+        np.testing.assert_allclose(targets, ahead, atol=1e-6)
         if frame < frames:
             batch.step(np.zeros((1, 46)))
 
 
-@pytest.mark.parametrize("part", [field.name for field in dataclasses.fields(ObservationConfig)])
-def test_every_part_can_be_switched_off(two_notes: Demonstration, part: str) -> None:
+@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(ObservationConfig)])
+def test_every_term_can_be_switched_off(name: str) -> None:
     everything = ObservationConfig(errors=True, time=True)
-    off: bool | int = 0 if part in ("goal", "fingertips") else False
-    less = dataclasses.replace(everything, **{part: off})  # type: ignore[arg-type]
-    goal, plan = two_notes.score.roll(), two_notes.plan
-    whole, rest = Observer(everything, goal, plan), Observer(less, goal, plan)
-    assert part not in [one.name for one in rest.parts if one.size]
-    size = whole.slices[part].stop - whole.slices[part].start
+    off: bool | int = 0 if name in ("goal", "fingertips") else False
+    less = dataclasses.replace(everything, **{name: off})  # type: ignore[arg-type]
+    whole, rest = (Observer(default_observation_terms(config)) for config in (everything, less))
+    assert name not in [term.name for term in rest.terms]
+    size = whole.slices[name].stop - whole.slices[name].start
     assert rest.size == whole.size - size
 
 
@@ -191,18 +193,19 @@ def test_cut_short_is_not_over(two_notes: Demonstration) -> None:
     assert not step.truncated[0]
 
 
-def test_episodes_begin_anywhere_in_the_state_of_the_prior(two_notes: Demonstration) -> None:
+def test_episodes_begin_anywhere_in_the_state_of_the_base_controller(
+    two_notes: Demonstration,
+) -> None:
     config = EnvConfig(episode=EpisodeConfig(start="anywhere"))
     batch = SongBatch(two_notes, config, 8)
     batch.reset(np.random.default_rng(3))
     began = batch.frames.copy()
     assert len(set(began.tolist())) > 3
-    world, tracker = World(), IkTracker()
-    tracker.begin(two_notes.plan)
+    world, controller = World(), IkTracker().start(two_notes.plan)
     for frame in range(len(two_notes.plan)):
         for row in np.flatnonzero(began == frame):
             assert (batch.state()["worlds"][row] == world.state()).all()
-        world.step(tracker.control(frame, world))
+        world.step(controller.control(frame, world))
     again = SongBatch(two_notes, config, 8)
     again.reset(np.random.default_rng(3))
     assert (again.observations == batch.observations).all()
@@ -211,9 +214,9 @@ def test_episodes_begin_anywhere_in_the_state_of_the_prior(two_notes: Demonstrat
 
 
 def test_a_batch_goes_on_from_its_state_bit_for_bit(
-    two_notes: Demonstration, every_part: EnvConfig
+    two_notes: Demonstration, every_term: EnvConfig
 ) -> None:
-    one, other = SongBatch(two_notes, every_part, 2), SongBatch(two_notes, every_part, 2)
+    one, other = SongBatch(two_notes, every_term, 2), SongBatch(two_notes, every_term, 2)
     one.reset(np.random.default_rng(0))
     one.frames[:] = 0
     one.step(actions(1, 2)[0])
@@ -233,7 +236,7 @@ def test_the_policy_can_work_the_pedal(two_notes: Demonstration) -> None:
         reward=dataclasses.replace(EnvConfig().reward, pedal=1.0),
     )
     batch = SongBatch(two_notes, config, 2)
-    assert batch.actions == 47
+    assert batch.action_size == 47
     batch.reset(np.random.default_rng(0))
     action = np.zeros((2, 47))
     action[:, 46] = 1.0, -1.0
@@ -242,17 +245,15 @@ def test_the_policy_can_work_the_pedal(two_notes: Demonstration) -> None:
     assert step.reward[1] - step.reward[0] == pytest.approx(1.0)
 
 
-def test_what_ends_is_told_apart_from_what_begins(two_notes: Demonstration) -> None:
-    """The last observation of an episode is told aside, and that of the next in its place."""
+def test_last_and_first_observations_are_kept_apart(two_notes: Demonstration) -> None:
+    """The last observation of an episode is in infos, the first of the next in its place."""
     frames = len(two_notes.plan)
     config = EnvConfig(
         observation=ObservationConfig(time=True), episode=EpisodeConfig(frames=frames - 5)
     )
     alone = SongBatch(two_notes, config, 1)
     vec = Sb3Env(SongBatch(two_notes, config, 2))
-    envs = gymnasium.make_vec(
-        "pianomime/Song-v0", num_envs=2, demonstration=two_notes, config=config
-    )
+    envs = gymnasium.make_vec(ENV, num_envs=2, demonstration=two_notes, config=config)
     alone.reset(np.random.default_rng(0))
     first = alone.observations[0].copy()
     vec.reset()
@@ -287,8 +288,8 @@ def test_stepping_past_the_end_is_refused(two_notes: Demonstration) -> None:
         batch.step(np.zeros((1, 46)))
 
 
-def test_poses_are_told_in_a_common_size(two_notes: Demonstration) -> None:
-    """Against what a World and MuJoCo's own figures say, joint by joint."""
+def test_poses_are_scaled_by_their_limits(two_notes: Demonstration) -> None:
+    """Against a World and MuJoCo's own limits, joint by joint."""
     config = ObservationConfig(errors=True)
     batch = SongBatch(two_notes, EnvConfig(observation=config), 1)
     batch.reset(np.random.default_rng(0))
@@ -300,8 +301,8 @@ def test_poses_are_told_in_a_common_size(two_notes: Demonstration) -> None:
     low, high = world.model.jnt_range[88:].T
     # The right hand comes first, as in the model.
     assert world.model.joint(88).name.startswith("rh_")
-    told = (low + high) / 2 + seen["joints"] * (high - low) / 2
-    np.testing.assert_allclose(told, world.data.qpos[88:], atol=1e-5)
+    joints = (low + high) / 2 + seen["joints"] * (high - low) / 2
+    np.testing.assert_allclose(joints, world.data.qpos[88:], atol=1e-5)
     assert np.abs(seen["joints"]).max() < 1.2
     np.testing.assert_allclose(seen["velocities"] * 10.0, world.data.qvel[88:], atol=1e-5)
     np.testing.assert_allclose(seen["keys"], world.key_state, atol=1e-6)
@@ -316,11 +317,12 @@ def test_a_start_in_the_middle_has_the_pedal_as_it_is(two_notes: Demonstration) 
     batch = SongBatch(two_notes, config, 64)
     batch.reset(np.random.default_rng(0))
     pedal = np.r_[False, two_notes.score.pedal_roll()]
-    told = batch.observations[:, batch.observer.slices["pedal"]][:, 0]
-    np.testing.assert_array_equal(told, pedal[batch.frames])
-    assert 0 < told.sum() < len(told)
+    down = batch.observations[:, batch.observer.slices["pedal"]][:, 0]
+    np.testing.assert_array_equal(down, pedal[batch.frames])
+    assert 0 < down.sum() < len(down)
 
 
-def test_presets_are_named_in_mistakes() -> None:
-    with pytest.raises(ValueError, match="paper, best"):
-        preset_config("worst")
+@pytest.mark.parametrize("preset", [preset_config, preset_env])
+def test_presets_are_named_in_mistakes(preset: Callable[[str], object]) -> None:
+    with pytest.raises(InputError, match="paper, best"):
+        preset("worst")

@@ -8,8 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from pianomime.learn.envs.reward import frame_reward, mimic_reward, press_reward, tolerance
-from pianomime.learn.expert.config import RewardConfig
+from pianomime.learn.envs.config import RewardConfig
+from pianomime.learn.envs.reference import Reference
+from pianomime.learn.envs.reward import (
+    default_reward_terms,
+    mimic_reward,
+    press_reward,
+    tolerance,
+    weighted_rewards,
+)
+from pianomime.learn.envs.state import EnvState
+from pianomime.plan import FingertipPlan
 
 
 def keys(**state: float) -> NDArray[np.float64]:
@@ -64,24 +73,51 @@ def test_mimic_reward_looks_from_above() -> None:
     np.testing.assert_allclose(mimic_reward(tips, targets), (9 + 0.1) / 10)
 
 
+def reward(
+    config: RewardConfig,
+    key_state: NDArray[np.float64],
+    pressed: NDArray[np.bool_],
+    goal: NDArray[np.bool_],
+    targets: NDArray[np.float64],
+    pedal: bool,
+) -> float:
+    """The sum of the terms in a frame in which the fingertips are at 0 and no pedal is wanted."""
+    points = np.zeros((1, 2, 6, 3))
+    points[:, :, 1:] = targets
+    none = np.zeros(0, np.int8)
+    plan = FingertipPlan(points, np.full((1, 2, 5), -1, np.int8), none, none)
+    state = EnvState(
+        reference=Reference(goal, np.array([False]), plan),
+        frames=np.array([0]),
+        joints=np.zeros((1, 54)),
+        velocities=np.zeros((1, 54)),
+        key_state=key_state,
+        pressed=pressed,
+        tips=np.zeros((1, 2, 5, 3)),
+        pedal=np.array([pedal]),
+        base_control=np.zeros((1, 46)),
+        action=np.zeros((1, 46)),
+    )
+    return float(sum(weighted_rewards(default_reward_terms(config), state).values())[0])
+
+
 def test_weights_are_those_of_table_3() -> None:
     pressed, goal = np.zeros((2, 1, 88), bool)
     goal[0, 3] = True
-    tips = np.zeros((1, 2, 5, 3))
-    far = tips + 1.0
-    yes = np.array([True])
+    near = np.zeros((1, 2, 5, 3))
+    far = near + 1.0
     down = keys(k3=1.0)
     pressed[0, 3] = True
     config = RewardConfig()
     np.testing.assert_allclose(
         [
-            frame_reward(config, down, pressed, goal, tips, tips, yes)[0],
-            frame_reward(config, down, pressed, goal, tips, far, yes)[0],
-            frame_reward(config, keys(), ~goal, goal, tips, tips, yes)[0],
+            reward(config, down, pressed, goal, near, False),
+            reward(config, down, pressed, goal, far, False),
+            reward(config, keys(), ~goal, goal, near, False),
         ],
         [1.0, 2 / 3, 1 / 3],
         atol=1e-2,
     )
-    weighed = RewardConfig(press=0.0, mimic=0.0, pedal=0.25)
-    assert frame_reward(weighed, down, pressed, goal, tips, far, yes) == 0.25
-    assert frame_reward(weighed, down, pressed, goal, tips, far, ~yes) == 0.0
+    weighted = RewardConfig(press=0.0, mimic=0.0, pedal=0.25)
+    assert reward(weighted, down, pressed, goal, far, False) == 0.25
+    assert reward(weighted, down, pressed, goal, far, True) == 0.0

@@ -203,6 +203,21 @@ def test_the_curve_is_in_tensorboard(demo: Path, tmp_path: Path, config: ExpertC
         ]
 
 
+def test_reward_terms_are_in_tensorboard(
+    demo: Path, tmp_path: Path, small_ppo: ExpertConfig
+) -> None:
+    """The mean of each term over the steps of an update; they add up to that of the reward."""
+    run = train_expert(demo, tmp_path / "run", small_ppo, threads=1)
+    log = EventAccumulator(str(run.tensorboard))
+    log.Reload()
+    tags = ("reward/press", "reward/mimic", "rollout/step_reward_mean")
+    press, mimic, total = ([event.value for event in log.Scalars(tag)] for tag in tags)
+    steps = [event.step for event in log.Scalars("reward/press")]
+    assert steps == [128, 256, 384]
+    np.testing.assert_allclose(np.add(press, mimic), total, rtol=1e-5)
+    assert "reward/pedal" not in log.Tags()["scalars"]
+
+
 def test_the_policy_works_the_pedal_when_it_plays(
     demo: Path, tmp_path: Path, small_ppo: ExpertConfig
 ) -> None:

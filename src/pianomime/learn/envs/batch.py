@@ -17,18 +17,19 @@ from pianomime.learn.envs.observation import (
     ObservationTerm,
     Observer,
     control_range,
-    observation_terms,
+    default_observation_terms,
 )
 from pianomime.learn.envs.reference import Reference
 from pianomime.learn.envs.reward import (
     RewardTerm,
     check_reward_terms,
-    reward_terms,
+    default_reward_terms,
     weighted_rewards,
 )
 from pianomime.learn.envs.state import EnvState
 from pianomime.plan import FingertipPlan
 from pianomime.plan.demonstration import Demonstration
+from pianomime.players.rollout import rollout
 from pianomime.track import BatchController, BatchTracker, DynamicTracker, IkTracker
 from pianomime.world import World, WorldBatch
 from pianomime.world.layout import LAYOUT
@@ -111,10 +112,10 @@ class SongBatch:
         self._worlds = WorldBatch(num_envs, threads, quiet=True)
         self._base = base_controller(config, demonstration.plan)
         self.reward_terms = check_reward_terms(
-            _reward_terms(config.reward) if reward_terms is None else reward_terms
+            default_reward_terms(config.reward) if reward_terms is None else reward_terms
         )
         self.observer = Observer(
-            _observation_terms(config.observation)
+            default_observation_terms(config.observation)
             if observation_terms is None
             else observation_terms
         )
@@ -162,6 +163,11 @@ class SongBatch:
     def qpos(self) -> NDArray[np.float64]:
         """(B, 142) positions: 88 keys, right hand 27, left hand 27 [rad, m]; a copy."""
         return self._worlds.qpos
+
+    @property
+    def key_state(self) -> NDArray[np.float64]:
+        """(B, 88) how far each key is down, 0..1."""
+        return self._worlds.key_state
 
     @property
     def pressed(self) -> NDArray[np.bool_]:
@@ -276,19 +282,13 @@ class SongBatch:
         """(T, S) states of the world before each frame when the base controller plays alone."""
         if self._start_states is None:
             world, base = World(quiet=True), base_controller(self.config, self._reference.plan)
-            states = []
-            for frame in range(len(self._reference)):
-                states.append(world.state())
-                world.step(base.control(frame, world), bool(self._reference.pedal[frame]))
-            self._start_states = np.array(states)
+            states = [world.state()]
+            states += [world.state() for _ in rollout(base, world, self._reference.pedal)]
+            self._start_states = np.array(states[:-1])
         return self._start_states
 
 
-# Under other names: SongBatch has arguments that are called so.
-_reward_terms, _observation_terms = reward_terms, observation_terms
-
-
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a table whose columns are aligned."""
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     return [

@@ -15,9 +15,9 @@ from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_RATE
 from pianomime.learn.envs.batch import SongBatch
 from pianomime.learn.envs.config import EnvConfig, preset_env
-from pianomime.learn.envs.observation import ObservationTerm, observation_terms
+from pianomime.learn.envs.observation import ObservationTerm, default_observation_terms
 from pianomime.learn.envs.reference import load_demonstration
-from pianomime.learn.envs.reward import RewardTerm, reward_terms
+from pianomime.learn.envs.reward import RewardTerm, default_reward_terms
 from pianomime.plan.demonstration import Demonstration
 from pianomime.world.render import Painter
 from pianomime.world.scene_look import key_colours
@@ -57,8 +57,8 @@ def make_batch(
         settings,
         num_envs,
         threads,
-        (*reward_terms(settings.reward), *extra_rewards),
-        (*observation_terms(settings.observation), *extra_observations),
+        (*default_reward_terms(settings.reward), *extra_rewards),
+        (*default_observation_terms(settings.observation), *extra_observations),
     )
 
 
@@ -116,7 +116,7 @@ class SongEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     def __str__(self) -> str:
         """The environment's name, and the table of its terms."""
-        return f"{super().__str__()}\n{self.batch}"
+        return f"{type(self).__name__}\n{self.batch}"
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -144,7 +144,7 @@ class SongEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
             },
         )
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """The scene as it is, (408, 960, 3) uint8; None without a render mode.
 
         Raises:

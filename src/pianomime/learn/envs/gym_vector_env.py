@@ -26,10 +26,12 @@ class SongVectorEnv(VectorEnv[_Rows, _Rows, NDArray[Any]]):
     `info` has arrays with an entry for each environment.
 
     Args:
-        demonstration, config: as for `SongEnv`.
+        demonstration: as for `SongEnv`.
+        config: as for `SongEnv`.
         num_envs: number of environments.
         threads: how many step at the same time; 0 for one on each core.
-        extra_rewards, extra_observations: as for `SongEnv`.
+        extra_rewards: as for `SongEnv`.
+        extra_observations: as for `SongEnv`.
 
     Raises:
         InputError: as from `SongEnv`.

@@ -54,7 +54,7 @@ class ObservationTerm:
             )
 
 
-def observation_terms(config: ObservationConfig) -> tuple[ObservationTerm, ...]:
+def default_observation_terms(config: ObservationConfig) -> tuple[ObservationTerm, ...]:
     """The terms that a config switches on, in the order in which they are concatenated."""
     terms: list[ObservationTerm] = []
 
@@ -117,9 +117,7 @@ class Observer:
             names = ", ".join(term.name for term in self.terms)
             raise InputError(f"observation terms must have different names, not {names}")
 
-    def write(
-        self, rows: NDArray[np.float32], ids: NDArray[np.int64], state: EnvState
-    ) -> None:
+    def write(self, rows: NDArray[np.float32], ids: NDArray[np.int64], state: EnvState) -> None:
         """Write the observations of n environments.
 
         Args:

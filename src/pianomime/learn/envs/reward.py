@@ -46,8 +46,8 @@ class RewardTerm:
             )
 
 
-def reward_terms(config: RewardConfig) -> tuple[RewardTerm, ...]:
-    """The terms of table 3 that have a weight: press, mimic, pedal, in this order."""
+def default_reward_terms(config: RewardConfig) -> tuple[RewardTerm, ...]:
+    """The terms of table 3 that have a weight other than 0: press, mimic, pedal, in this order."""
     terms = (
         RewardTerm("press", partial(_press, hit=config.hit), config.press),
         RewardTerm("mimic", _mimic, config.mimic),
@@ -85,8 +85,7 @@ def weighted_rewards(
         values = term.func(state)
         if values.shape != (len(state),):
             raise ValueError(
-                f"reward term {term.name!r} must have the shape {(len(state),)}, "
-                f"not {values.shape}"
+                f"reward term {term.name!r} must have the shape {(len(state),)}, not {values.shape}"
             )
         rewards[term.name] = term.weight * values.astype(np.float64, copy=False)
     return rewards
@@ -150,4 +149,5 @@ def _mimic(state: EnvState) -> NDArray[np.float64]:
 
 
 def _pedal(state: EnvState) -> NDArray[np.bool_]:
-    return state.pedal == state.pedal_goal
+    right: NDArray[np.bool_] = state.pedal == state.pedal_goal
+    return right
