@@ -27,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pianomime
 from common import cores, parser
-from pianomime import songs
+from pianomime import load_player, songs
 from pianomime.files import atomic
 
 STORED = Path(__file__).with_name("digest.json")
@@ -77,10 +77,10 @@ def play(job: Job) -> dict[str, str | float]:
 
         demonstration, _ = next(iter(read_published(Path(job.path))))
         demonstration = demonstration.excerpt(0.0, job.seconds)
-        player = pianomime.Player.from_demonstration(demonstration, job.player, job.effort)
+        player = load_player(job.player, job.effort, demonstration=demonstration)
         score = demonstration.score
     else:
-        player = pianomime.Player.from_name(job.player, job.effort)
+        player = pianomime.load_player(job.player, job.effort)
         score = pianomime.excerpt(pianomime.Score.from_midi(job.path), seconds=job.seconds)
     performance = player.play(score)
     digest = hashlib.sha256(performance.ctrl.tobytes()).hexdigest()[:16]

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from pianomime import Player, Score, excerpt, songs
+from pianomime import Score, excerpt, load_player, songs
 from pianomime.report import LIGHT, draw
 from pianomime.world.render import render_frame
 
@@ -26,7 +26,7 @@ WIDTH = 1280
 def main() -> None:
     """Play, draw, and put one above the other."""
     score = excerpt(Score.from_midi(songs.path(SONG)), seconds=SECONDS)
-    performance = Player.from_name("zero-shot").play(score)
+    performance = load_player("zero-shot").play(score)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "roll.png")
         draw(performance, path, LIGHT)

@@ -10,7 +10,6 @@ from pianomime import load_player
 from pianomime.errors import InputError
 from pianomime.plan import ZeroShotPlanner
 from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner, on_grid
-from pianomime.players.player import DEMONSTRATION_PLAYERS
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +92,7 @@ def test_the_planner_knows_one_score(shown):
         planner.plan(shown.score.transpose(1))
 
 
-@pytest.mark.parametrize("name", DEMONSTRATION_PLAYERS)
+@pytest.mark.parametrize("name", ["demonstration", "demonstration-ik"])
 def test_players_play_it(shown, name):
     performance = load_player(name, demonstration=shown).play(shown.score)
     assert performance.player == name

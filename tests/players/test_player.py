@@ -3,12 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pianomime import Player, excerpt, songs
+from pianomime import excerpt, load_player
 from pianomime.errors import InputError
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
-from pianomime.players.player import PLAYERS
-from pianomime.policies.methods import FINGERS, METHODS
+from pianomime.players import PlannedPlayer
 from pianomime.world import World
 
 
@@ -49,11 +48,8 @@ def test_excerpts_that_make_no_sense_are_refused(
         excerpt(two_notes(), start, seconds)
 
 
-class OneFinger:
-    """Plans nothing; its tracker writes down when it is asked what, and waves."""
-
-    def __init__(self) -> None:
-        self.asked: list[int] = []
+class NoPlanner:
+    """Plans nothing."""
 
     def plan(self, score: Score) -> FingertipPlan:
         frames = len(score.roll())
@@ -64,19 +60,42 @@ class OneFinger:
             np.full(len(score), -1, np.int8),
         )
 
-    def begin(self, plan: FingertipPlan) -> None:
-        self.asked = []
+
+class Waving:
+    """A controller that waves, and writes down when it is asked what."""
+
+    replayable = True
+
+    def __init__(self, plan: FingertipPlan) -> None:
+        self.plan = plan
+        self.asked: list[int] = []
 
     def control(self, frame: int, world: World) -> np.ndarray:
         self.asked.append(frame)
         return np.full(46, 0.01 * (frame % 5))
 
 
+class WavingTracker:
+    """Keeps the controllers that it started."""
+
+    def __init__(self) -> None:
+        self.started: list[Waving] = []
+
+    def start(self, plan: FingertipPlan) -> Waving:
+        self.started.append(Waving(plan))
+        return self.started[-1]
+
+
 def test_a_player_asks_for_every_frame_once_and_records_what_happened() -> None:
-    one = OneFinger()
+    tracker = WavingTracker()
     score = excerpt(two_notes(), seconds=2.0)
     told: list[tuple[str, int, int]] = []
-    performance = Player("one finger", one, one).play(score, lambda *step: told.append(step))
+
+    def progress(phase: str, done: int, total: int, remark: str = "") -> None:
+        told.append((phase, done, total))
+
+    performance = PlannedPlayer("one finger", NoPlanner(), tracker).play(score, progress)
+    (one,) = tracker.started
 
     frames = len(score.roll())
     assert one.asked == list(range(frames))
@@ -108,22 +127,11 @@ def test_frames_in_which_the_physics_broke_are_recorded(monkeypatch: pytest.Monk
                 self.blow_ups += 1
 
     monkeypatch.setattr("pianomime.players.player.World", Fragile)
-    one = OneFinger()
-    performance = Player("one finger", one, one).play(excerpt(two_notes(), seconds=2.0))
+    player = PlannedPlayer("one finger", NoPlanner(), WavingTracker())
+    performance = player.play(excerpt(two_notes(), seconds=2.0))
     assert performance.blow_ups.tolist() == [2, 3, 7]
 
 
 def test_an_unknown_player_is_refused_with_a_list() -> None:
     with pytest.raises(InputError, match=r"no player 'liszt'.*zero-shot"):
-        Player.from_name("liszt")
-
-
-# Those that learned have weights, and tests, of their own.
-@pytest.mark.parametrize("name", sorted({*PLAYERS} - {FINGERS, *METHODS}))
-def test_every_player_plays_and_does_so_again(name: str) -> None:
-    score = excerpt(Score.from_midi(songs.path("beethoven-ode-to-joy")), seconds=3.0)
-    first = Player.from_name(name).play(score)
-    assert first.player == name
-    assert first.metrics()["recall"] > 0.2
-    again = Player.from_name(name).play(score)
-    np.testing.assert_array_equal(first.qpos, again.qpos)
+        load_player("liszt")

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pianomime import load_player
 from pianomime.errors import InputError
 from pianomime.music import Score, frame_metrics
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
-from pianomime.players.player import Player
+from pianomime.players import rollout
 from pianomime.track import (
     DynamicTracker,
     PredictiveSamplingConfig,
@@ -34,11 +35,9 @@ def plan(score: Score) -> FingertipPlan:
 
 def follow(tracker: Tracker, plan: FingertipPlan) -> tuple[NDArray[np.float64], float]:
     world = World()
-    tracker.begin(plan)
     ctrl, pressed = [], []
-    for frame in range(len(plan)):
-        ctrl.append(tracker.control(frame, world))
-        world.step(ctrl[-1])
+    for step in rollout(tracker.start(plan), world, np.zeros(len(plan), bool)):
+        ctrl.append(step.ctrl)
         pressed.append(world.pressed)
     return np.array(ctrl), frame_metrics(plan.keys(), np.array(pressed)).f1
 
@@ -71,30 +70,42 @@ def test_leaves_alone_what_goes_well(plan: FingertipPlan) -> None:
 
 def test_the_world_is_left_as_it_was(plan: FingertipPlan) -> None:
     tracker, world = PredictiveSamplingTracker(DynamicTracker(), QUICK), World()
-    tracker.begin(plan)
+    controller = tracker.start(plan)
     before = world.state()
-    tracker.control(0, world)
+    controller.control(0, world)
     np.testing.assert_array_equal(world.state(), before)
 
 
-def test_more_effort_tries_more() -> None:
-    tried = [PredictiveSamplingConfig.of_effort(effort) for effort in (1, 2, 3)]
-    rollouts = [config.variations * config.rounds for config in tried]
-    assert rollouts == sorted(set(rollouts))
+def test_more_effort_simulates_more(plan: FingertipPlan) -> None:
+    steps = []
+    for effort in (1, 2):
+        config = PredictiveSamplingConfig.of_effort(effort)
+        controller = PredictiveSamplingTracker(DynamicTracker(), config).start(plan)
+        for _ in rollout(controller, World(), np.zeros(16, bool)):
+            pass
+        steps.append(controller.steps)
+    assert steps[1] > 2 * steps[0]
+
+
+def test_a_controller_with_a_memory_is_refused_in_one_line(plan: FingertipPlan) -> None:
+    nested = PredictiveSamplingTracker(PredictiveSamplingTracker(DynamicTracker(), QUICK), QUICK)
+    with pytest.raises(InputError, match="needs a replayable controller") as error:
+        nested.start(plan)
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("effort", [-1, 4])
 def test_no_such_effort(effort: int) -> None:
     with pytest.raises(InputError, match="effort must be"):
-        Player.from_name("zero-shot", effort)
+        load_player("zero-shot", effort)
 
 
 def test_an_imagined_disaster_is_no_warning(plan: FingertipPlan) -> None:
     wild = PredictiveSamplingConfig(variations=8, joint=50.0, wrist=50.0, slide=5.0)
-    tracker, world = PredictiveSamplingTracker(DynamicTracker(), wild), World()
-    tracker.begin(plan)
+    controller = PredictiveSamplingTracker(DynamicTracker(), wild).start(plan)
+    world = World()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for frame in range(12):
-            world.step(tracker.control(frame, world))
+            world.step(controller.control(frame, world))
     assert world.blow_ups == 0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -20,23 +21,27 @@ class Evaluate:
       pianomime evaluate FOLDER
       pianomime evaluate FOLDER more/SONG.mid fur-elise -o out/all --jobs 4
       pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
+      pianomime evaluate FOLDER --player my_module:make_player --planner.beam 200
     """
 
     paths: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="PATH...")]
     """MIDI files, folders of them, or names of bundled songs."""
-    player: Annotated[str, tyro.conf.arg(metavar="NAME")] = "zero-shot"
-    """Name of the player."""
+    player: Annotated[str, tyro.conf.arg(metavar="PLAYER")] = "zero-shot"
+    """Who plays: a name (see `pianomime players`), PACKAGE.MODULE:FACTORY, the folder of an expert
+    (see `pianomime train-expert`) or of weights (see `pianomime train`)."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
     """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
     On two cores 1 takes about as long as the music or less, 2 and 3 several times longer. For
-    players that imitate it is 2, 5, 20 or 100 steps of a diffusion."""
+    generalists it is 2, 5, 20 or 100 steps of the diffusion."""
+    settings: tyro.conf.Suppress[dict[str, str]] = field(default_factory=dict)
+    """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much of each song to play at most, from its first note [s]."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Songs played at the same time; one a core if not given. They slow each other down: compare
     real time only between runs with the same N."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Of what the player draws."""
+    """Seed of everything that is random."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the results; out/evaluate-PLAYER-EFFORT if not given."""
 
@@ -51,17 +56,20 @@ class Evaluate:
         from pianomime.evaluation.evaluation import evaluate, markdown
 
         seeded = f"-seed{self.seed}" if self.seed else ""
-        out = self.out or Path("out", f"evaluate-{self.player}-{self.effort}{seeded}")
+        # A player may be called by a path or a module.
+        name = re.sub(r"[^\w.-]+", "-", self.player).strip("-.")
+        out = self.out or Path("out", f"evaluate-{name}-{self.effort}{seeded}")
         with bars() as progress:
             results = evaluate(
                 self.paths,
                 self.player,
-                self.seconds,
-                self.jobs,
-                out,
-                progress=progress,
                 effort=self.effort,
                 seed=self.seed,
+                settings=self.settings,
+                seconds=self.seconds,
+                jobs=self.jobs,
+                out=out,
+                progress=progress,
             )
         print(markdown(results))
         print(f"saved: {out / 'results.json'}")

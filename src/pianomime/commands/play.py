@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from pianomime.evaluation.summary import Row
     from pianomime.music import Score
-    from pianomime.players.player import Player
+    from pianomime.players import Player
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class Play:
       pianomime play SONG.mid --start 60 --seconds 180
       pianomime play DEMO.npz --player demonstration-ik
       pianomime play SONG.mid --player RUN
+      pianomime play SONG.mid --player my_module:make_player --seed 1
+      pianomime play SONG.mid --effort 0 --planner.beam 200
     """
 
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
@@ -37,13 +39,18 @@ class Play:
     `pianomime songs`)."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the report; out/NAME if not given."""
-    player: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Name of the player; zero-shot if not given, and for demonstrations, demonstration. Or the
-    folder of an expert (see `pianomime train-expert`), which plays what it was trained on."""
+    player: Annotated[str | None, tyro.conf.arg(metavar="PLAYER")] = None
+    """Who plays: a name (see `pianomime players`), PACKAGE.MODULE:FACTORY, the folder of an expert
+    (see `pianomime train-expert`) or of weights (see `pianomime train`). zero-shot if not given,
+    and for demonstrations, demonstration."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
     """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
     On two cores 1 takes about as long as the music or less, 2 and 3 several times longer. For
-    players that imitate it is 2, 5, 20 or 100 steps of a diffusion."""
+    generalists it is 2, 5, 20 or 100 steps of the diffusion."""
+    seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Seed of everything that is random."""
+    settings: tyro.conf.Suppress[dict[str, str]] = field(default_factory=dict)
+    """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
     """How much to play at most, from what sounds at START or first after it [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
@@ -64,57 +71,49 @@ class Play:
         from pianomime.files import staged
         from pianomime.report import FILES, write_report
 
-        player, score, name = self._cast()
+        player, score, name = self._load()
         out = self.out or Path("out", name)
         notes: list[str] = []
-        with staged(out, FILES) as folder, bars() as tell:
+        with staged(out, FILES) as folder, bars() as progress:
             row = write_report(
-                player.play(score, tell), folder, self.video, progress=tell, note=notes.append
+                player.play(score, progress),
+                folder,
+                self.video,
+                progress=progress,
+                note=notes.append,
             )
         Console().print(_table(row))
         for note in notes:
             print(note)
         print(f"look and listen: {out / 'report.html'}")
 
-    def _cast(self) -> tuple[Player, Score, str]:
+    def _load(self) -> tuple[Player, Score, str]:
         """Who plays what, and the name of its file."""
-        from pianomime.music import Score
-        from pianomime.music.excerpt import excerpt
-        from pianomime.players.player import DEMONSTRATION_PLAYERS, PLAYERS, Player
+        from pianomime.errors import InputError
+        from pianomime.music import Score, excerpt
+        from pianomime.plan.demonstration import Demonstration
+        from pianomime.players import load_player
         from pianomime.songs.find import find_song
 
-        known = {*PLAYERS, *DEMONSTRATION_PLAYERS}
-        if self.player is not None and self.player not in known and Path(self.player).is_dir():
-            return self._cast_expert(Path(self.player))
-        if Path(self.song).suffix == ".npz":
-            from pianomime.plan.demonstration import Demonstration
-
-            shown = Demonstration.load(self.song).excerpt(self.start, self.seconds)
-            if self.player in PLAYERS:
-                player = Player.from_name(self.player, self.effort)
-            else:
-                player = Player.from_demonstration(shown, self.player or "", self.effort)
+        shown = Demonstration.load(self.song) if Path(self.song).suffix == ".npz" else None
+        name = self.player or ("zero-shot" if shown is None else "demonstration")
+        start, seconds = self.start, self.seconds
+        if shown is not None and name in ("demonstration", "demonstration-ik"):
+            shown = shown.excerpt(start, seconds)
+            player = load_player(name, self.effort, self.seed, demonstration=shown, **self.settings)
             return player, shown.score, Path(self.song).stem
-        player = Player.from_name(self.player or "zero-shot", self.effort)
+        player = load_player(name, self.effort, self.seed, **self.settings)
+        if player.excerpt is not None:
+            for option in ("start", "seconds", "effort"):
+                if getattr(self, option) != getattr(Play, option):
+                    raise InputError(
+                        f"--{option}: {name} plays the excerpt that it was trained on, as it does"
+                    )
+            start, seconds = player.excerpt
+        if shown is not None:
+            return player, shown.excerpt(start, seconds).score, Path(self.song).stem
         midi = find_song(self.song)
-        score = excerpt(Score.from_midi(midi), self.start, self.seconds)
-        return player, score, midi.stem
-
-    def _cast_expert(self, folder: Path) -> tuple[Player, Score, str]:
-        """The expert of a run; it plays the excerpt that it was trained on."""
-        from pianomime.commands.extras import extra
-        from pianomime.errors import InputError
-
-        for name in ("start", "seconds", "effort"):
-            if getattr(self, name) != getattr(Play, name):
-                raise InputError(f"--{name}: an expert plays what it was trained on, as it does")
-        with extra("train"):
-            from pianomime.learn.envs.reference import load_score
-            from pianomime.learn.expert.expert import load_expert
-
-            player, run = load_expert(folder)
-            score = load_score(self.song, run.start, run.seconds)
-        return player, score, Path(self.song).stem
+        return player, excerpt(Score.from_midi(midi), start, seconds), midi.stem
 
 
 def _table(row: Row) -> Table:

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import closing
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -15,14 +15,15 @@ from typing import Any
 
 import pianomime
 from pianomime.errors import InputError
-from pianomime.evaluation.song_worker import SONG_WORKER
+from pianomime.evaluation.song_worker import SONG_WORKER, play_song
 from pianomime.files import atomic
 from pianomime.keyboard import EXCERPT_SECONDS
-from pianomime.players.player import EFFORT, Player, check_player
-from pianomime.policies.methods import weight_files
+from pianomime.players.player import Player
+from pianomime.players.registry import EFFORT, load_player, player_files
+from pianomime.players.settings import flat
 from pianomime.progress import Progress, no_progress
 from pianomime.songs.find import find_songs
-from pianomime.workers import cores, work
+from pianomime.workers import answered, cores, work
 
 Row = dict[str, Any]
 """The numbers of one song (see `pianomime.evaluation.summary`) and its `causes` (see
@@ -34,56 +35,61 @@ _LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy", "symusic")
 
 def evaluate(
     paths: str | Path | Iterable[str | Path],
-    player: str = "zero-shot",
+    player: str | Path | Player = "zero-shot",
+    *,
+    effort: int = EFFORT,
+    seed: int = 0,
+    settings: Mapping[str, Any] | None = None,
     seconds: float = EXCERPT_SECONDS,
     jobs: int | None = None,
     out: str | Path | None = None,
     progress: Progress = no_progress,
-    effort: int = EFFORT,
-    seed: int = 0,
 ) -> dict[str, Any]:
     """Play and score songs, several at a time, each in a process of its own.
 
     A song that fails becomes a row with an `error`, and the others go on. With a folder `out`,
-    a song that was finished there before by the same player and program is not played again, so
-    a run that was interrupted, however hard, goes on where it was.
+    a song that was finished there before is not played again, unless anything that decides how it
+    is played has changed: the player, its settings, its files, our code, its libraries. So an
+    evaluation that was interrupted, however hard, resumes where it was.
 
     Args:
         paths: MIDI files, folders of them, or names of bundled songs.
-        player: name of the player.
+        player: whatever `load_player` takes. A `Player` that was made already is played in this
+            process, one song after the other, and nothing of an earlier call is reused.
+        effort: how hard it tries, 0 to 3.
+        seed: of everything that is random.
+        settings: of the player, as `load_player` takes them.
         seconds: how much of each song to play at most, from its first note [s].
         jobs: processes; one a core that this one may use if None. They share the cores, so
             `realtime_factor` and the times depend on it.
         out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
         progress: told the songs done, the songs in all and their mean F1 so far.
-        effort: how hard the player tries, 0 to 3.
-        seed: of what it draws.
 
     Returns:
-        What `results.json` holds: `player`, `effort`, `seed` and `seconds` as asked for (None:
-        whole songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was
+        What `results.json` holds: `player`, `effort`, `seed`, `settings` and `seconds` as asked for
+        (None: whole songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was
         measured, over the songs that did not fail; empty if all did) and `causes` (`missed` and
         `wrong`: the share of the key-frames wanted in all songs that each cause cost, the
         costliest first).
 
     Raises:
-        InputError: a path stands for no song, or there is no such player, or its weights cannot be
-            read.
+        InputError: a path stands for no song, or there is no such player or setting, or its
+            files cannot be read.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
-    check_player(player, effort)
     if not seconds > 0:
         raise InputError(f"seconds must be more than 0, not {seconds:g}")
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
-    if seed < 0:
-        raise InputError(f"seed must be 0 or more, not {seed}")
-    weights = weight_files(player)
-    if weights:  # Whether they can be read is told here, once.
-        Player.from_name(player, effort, seed)
-    setting = f"{player} {effort} {seconds:g} {seed} {_digest(weights)}"
-    store = None if out is None else _Store(Path(out), setting)
+    chosen = flat(settings or {})
+    # What is wrong with the player is reported here, once, and not by every song.
+    loaded = load_player(player, effort, seed, **chosen)
+    made_by = ""
+    if not isinstance(player, Player):
+        key = [str(player), effort, seed, chosen, f"{seconds:g}", _digest(player_files(player))]
+        made_by = f"{json.dumps(key, sort_keys=True, default=str)} {_program_hash()}"
+    store = None if out is None else _Store(Path(out), made_by)
 
     rows: dict[Path, Row] = {}
 
@@ -96,14 +102,24 @@ def evaluate(
 
     waiting = []
     for song in songs:
-        known = None if store is None else store.get(song)
+        known = store.get(song) if store is not None and made_by else None
         if known is None:
             waiting.append(song)
         else:
             rows[song] = known
             report()
-    setup = {"player": player, "effort": effort, "seed": seed, "seconds": seconds}
-    with closing(work(SONG_WORKER, waiting, jobs or cores(), setup, str)) as played:
+    if isinstance(player, Player):
+        playing = _in_this_process(waiting, loaded, seconds)
+    else:
+        setup = {
+            "player": str(player),
+            "effort": effort,
+            "seed": seed,
+            "settings": chosen,
+            "seconds": seconds,
+        }
+        playing = work(SONG_WORKER, waiting, jobs or cores(), setup, str)
+    with closing(playing) as played:
         for song, result in played:
             row = {"song": song.stem, **result}
             if store is not None and "error" not in row:
@@ -112,9 +128,10 @@ def evaluate(
             report()
 
     results = {
-        "player": player,
-        "effort": effort,
+        "player": loaded.name if isinstance(player, Player) else str(player),
+        "effort": loaded.effort if isinstance(player, Player) else effort,
         "seed": seed,
+        "settings": chosen,
         "seconds": seconds if math.isfinite(seconds) else None,
         "songs": [rows[song] for song in songs],
         "mean": _mean(list(rows.values())),
@@ -123,6 +140,14 @@ def evaluate(
     if store is not None:
         store.close(results)
     return results
+
+
+def _in_this_process(
+    songs: list[Path], player: Player, seconds: float
+) -> Generator[tuple[Path, Row], None, None]:
+    """Songs with their rows, for a player that exists in this process alone."""
+    for song in songs:
+        yield song, answered(lambda path: play_song(player, path, seconds), song)
 
 
 def markdown(results: dict[str, Any]) -> str:
@@ -192,13 +217,13 @@ def _causes(rows: list[Row]) -> dict[str, dict[str, float]]:
 class _Store:
     """Finished songs in a folder: one file each, written whole, named by what made it."""
 
-    def __init__(self, out: Path, setting: str) -> None:
+    def __init__(self, out: Path, made_by: str) -> None:
         if out.exists() and not out.is_dir():
             raise InputError(f"{out}: is a file; a folder is needed")
         self._out = out
         self._songs = out / "songs"
         self._songs.mkdir(parents=True, exist_ok=True)
-        self._made_by = f"{setting} {_program_hash()}".encode()
+        self._made_by = made_by.encode()
 
     def get(self, song: Path) -> Row | None:
         try:
@@ -230,7 +255,7 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _program_hash() -> str:
-    """Changes with our code, its figures and its libraries, so that no older result is reused."""
+    """Changes with our code, its parameters and its libraries: no older result is reused."""
     digest = hashlib.sha256()
     for library in _LIBRARIES:
         with contextlib.suppress(PackageNotFoundError):  # Not all are in every installation.

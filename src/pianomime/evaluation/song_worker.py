@@ -11,6 +11,7 @@ from pianomime.evaluation.summary import summarize
 from pianomime.music import Score
 from pianomime.music.excerpt import excerpt
 from pianomime.players.player import Player
+from pianomime.players.registry import load_player
 
 SONG_WORKER = "pianomime.evaluation.song_worker:load_song_worker"
 """`load_song_worker`, for `pianomime.workers`."""
@@ -20,23 +21,35 @@ def load_song_worker(setup: dict[str, Any]) -> Callable[[str], dict[str, Any]]:
     """Load a player, once for all songs of a process.
 
     Args:
-        setup: `player`, `effort` and `seed`, what is to be loaded; `seconds`, how much of a song to
-            play at most [s].
+        setup: `player`, `effort`, `seed` and `settings`, what `load_player` takes; `seconds`, how
+            much of a song to play at most [s].
 
     Returns:
-        What plays a MIDI file and gives its row: the summary, with the name of the file as its
-        `song`, and `causes`, the frames that each cause cost, if the player plans.
+        What plays a MIDI file and gives its row, as `play_song` does.
     """
-    player = Player.from_name(setup["player"], setup["effort"], setup["seed"])
+    player = load_player(setup["player"], setup["effort"], setup["seed"], **setup["settings"])
+    return lambda path: play_song(player, Path(path), setup["seconds"])
 
-    def play(path: str) -> dict[str, Any]:
-        song = Path(path)
-        score = excerpt(Score.from_midi(song), seconds=setup["seconds"])
-        performance = player.play(score)
-        # Two files can bear one title, but not one name in a folder.
-        row: dict[str, Any] = {**summarize(performance), "song": song.stem}
-        if performance.plan is not None:
-            row["causes"] = frames_by_cause(diagnose(performance))
-        return row
 
-    return play
+def play_song(player: Player, song: Path, seconds: float) -> dict[str, Any]:
+    """Play a song and score it.
+
+    Args:
+        player: who plays.
+        song: a MIDI file.
+        seconds: how much of it to play at most [s]; a player of one excerpt plays that.
+
+    Returns:
+        The row: the summary, with the name of the file as its `song`, and `causes`, the frames that
+        each cause cost, if the player plans.
+
+    Raises:
+        InputError: the file cannot be read, or this player cannot play it.
+    """
+    start, length = player.excerpt or (0.0, seconds)
+    performance = player.play(excerpt(Score.from_midi(song), start, length))
+    # Two files can bear one title, but not one name in a folder.
+    row: dict[str, Any] = {**summarize(performance), "song": song.stem}
+    if performance.plan is not None:
+        row["causes"] = frames_by_cause(diagnose(performance))
+    return row

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import BLACK, NO_KEY
 from pianomime.plan.fingertip_plan import FingertipPlan
 from pianomime.plan.joint_path import KEY_REST, PathConfig, smooth_path
+from pianomime.validation import above_zero, finite
 from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
@@ -51,6 +52,11 @@ class HandPathConfig:
     """Deviation of an idle fingertip from the given hands at which its cost is 1 [m]."""
     alike_wrist: float = 0.05
     """Deviation of a wrist from the given hands along the keyboard at which its cost is 1 [m]."""
+
+    def __post_init__(self) -> None:
+        finite(self)
+        for name in ("alike", "alike_wrist"):
+            above_zero(name, getattr(self, name))
 
 
 def hand_paths(

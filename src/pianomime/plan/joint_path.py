@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from pianomime.keyboard import BLACK, FRAME_SECONDS
+from pianomime.validation import above_zero
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import key_centres, key_half_sizes
@@ -68,6 +69,10 @@ class PathConfig:
     """Largest displacement of a joint in one Gauss-Newton step [rad, m]."""
     iterations: int = 10
     """Number of Gauss-Newton steps."""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            above_zero(name, value)
 
 
 def smooth_path(

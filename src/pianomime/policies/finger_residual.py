@@ -1,55 +1,83 @@
-"""One learned residual for every finger of every song, on what the dynamic tracker proposes.
+"""The finger residual: one policy for every finger of every song, on top of the dynamic tracker.
 
-All ten fingers share a policy. Each is told of its own surroundings alone, and left ones as if in a
-mirror, so that there are ten times as many moments to learn from, and no song is unlike the others.
+All ten fingers share a policy. Each observes its own surroundings alone, and left fingers observe
+them mirrored: so ten samples come of every state, and songs resemble each other.
 """
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.keyboard import BLACK, FRAME_SECONDS, KEYS
+from pianomime.keyboard import BLACK, FRAME_SECONDS, NO_KEY
 from pianomime.plan import FingertipPlan
 from pianomime.plan.joint_path import resting_height
 from pianomime.policies.policy import Inference
 from pianomime.track import DynamicTracker
+from pianomime.track.dynamic import DynamicController
 from pianomime.world import World
 from pianomime.world.hand import both_hands
-from pianomime.world.layout import LAYOUT
+from pianomime.world.layout import FINGER_COUNT, LAYOUT
 from pianomime.world.parameters import key_centres
 
-ACTIONS = 5
-"""Numbers that a finger says: of its actuators, of which some fingers have fewer."""
+AGENTS = 2 * FINGER_COUNT
+"""Fingers that share the policy, left thumb first."""
+ACTIONS = max(part.stop - part.start for part in LAYOUT.finger_actuators)
+"""Size of a finger's action: its actuators; fingers with fewer ignore the rest."""
 AMPLITUDE = 0.15
-"""[rad] of an actuator for 1."""
+"""Residual of an actuator for an action of 1 [rad]."""
 _BEFORE, _AHEAD = 2, 5
-"""Frames of its presses that a finger knows, before the present one and from it on."""
-_JOINTS = 5
-_CM = 0.01
+"""Frames of its presses that a finger observes: before the present one, and from it on."""
+_JOINTS = max(part.stop - part.start for part in LAYOUT.finger_joints)
 _NEAR = 0.016
-"""[m] along the keyboard from a fingertip within which keys are told to it."""
-SIZE = 5 + 3 * (_BEFORE + _AHEAD) + 2 + 3 + 1 + 3 + 4 + 2 * _JOINTS + 2
-"""Numbers that a finger is told."""
+"""A finger observes unwanted keys within this distance along the keyboard [m]."""
+_LENGTH = 0.01
+"""Unit of lengths [m]; they are clipped to 4 units (heights to -3..5)."""
+_DEPTH = 0.05
+"""Unit of the place along the key [m]."""
+_ANGLE = 0.2
+"""Unit of joint angles, and of the angle that a joint turns in a frame [rad]."""
+_PARTS = {
+    "finger": FINGER_COUNT,
+    "presses": _BEFORE + _AHEAD,
+    "presses its present key": _BEFORE + _AHEAD,
+    "distance to keys": _BEFORE + _AHEAD,
+    "key is black": 1,
+    "key state": 1,
+    "tip error": 3,
+    "height": 1,
+    "unwanted keys": 2,
+    "place along the key": 1,
+    "neighbours press": 2,
+    "neighbours press next": 2,
+    "joint errors": _JOINTS,
+    "joint velocities": _JOINTS,
+    "forearm": 2,
+}
+"""Parts of a finger's observation, in order, with their sizes."""
+SIZE = sum(_PARTS.values())
+"""Size of a finger's observation."""
+_MIRROR = np.array([-1.0, 1.0])[:, None]
 
 
 class FingerObservation:
-    """What fingers are told, of one plan.
+    """Encodes the observations of all fingers that follow one plan.
 
     Args:
-        plan: which.
-        tracker: that follows it, `begin` done.
+        controller: the dynamic controller of the plan.
     """
 
-    def __init__(self, plan: FingertipPlan, tracker: DynamicTracker) -> None:
-        self._tracker = tracker
-        frames = len(plan)
-        padded = np.full((frames + _BEFORE + _AHEAD, 2, 5), -1, np.int64)
-        padded[_BEFORE : _BEFORE + frames] = plan.finger_key
-        self._keys = padded
+    def __init__(self, controller: DynamicController) -> None:
+        plan = controller.plan
+        self._controller = controller
+        around = np.full((len(plan) + _BEFORE + _AHEAD, 2, FINGER_COUNT), NO_KEY, np.int64)
+        around[_BEFORE : _BEFORE + len(plan)] = plan.finger_key
+        self._keys = around
         self._goal = plan.keys()
 
-    def look(
+    def encode(
         self,
         frame: int,
         qpos: NDArray[np.float64],
@@ -57,105 +85,131 @@ class FingerObservation:
         key_state: NDArray[np.float64],
         points: NDArray[np.float64],
     ) -> NDArray[np.float32]:
-        """(10, SIZE), left hand first.
+        """The observations (10, SIZE) before a frame, left thumb first.
 
         Args:
             frame: the next that is played.
-            qpos: (142,) positions of everything [rad, m].
-            qvel_hands: (54,) velocities of the hands [rad/s, m/s].
-            key_state: (88,) how far each key is down.
-            points: (2, 6, 3) where forearms and fingertips are [m].
+            qpos: (142,) positions of keys and hands [rad, m].
+            qvel_hands: (54,) velocities of the hands, right then left [rad/s, m/s].
+            key_state: (88,) how far each key is down, 0..1.
+            points: (2, 6, 3) wrists and fingertips [m].
         """
-        aim, path = self._tracker.aim(frame)
+        aim, path = self._controller.aim(frame)
         tips = points[:, 1:]
-        mirror = np.array([-1.0, 1.0])[:, None]
-        told = np.zeros((2, 5, SIZE), np.float32)
-        told[..., :5] = np.eye(5)
-        at = 5
+        along = key_centres()[:, 1]
         around = self._keys[frame : frame + _BEFORE + _AHEAD]
-        now = around[_BEFORE]
         pressing = around >= 0
-        beside = key_centres()[around, 1] - tips[None, ..., 1]
-        width = _BEFORE + _AHEAD
-        told[..., at : at + width] = pressing.transpose(1, 2, 0)
-        at += width
-        told[..., at : at + width] = (pressing & (around == now)).transpose(1, 2, 0)
-        at += width
-        off = np.where(pressing, np.clip(mirror * beside / _CM, -4.0, 4.0), 0.0)
-        told[..., at : at + width] = off.transpose(1, 2, 0)
-        at += width
+        now = around[_BEFORE]
         own = np.maximum(now, 0)
-        told[..., at] = (now >= 0) & BLACK[own]
-        told[..., at + 1] = np.where(now >= 0, key_state[own], 0.0)
-        at += 2
+        beside = _clip(_MIRROR * (along[around] - tips[None, ..., 1]))
         error = aim - tips
-        error[..., 1] *= mirror
-        told[..., at : at + 3] = np.clip(error / _CM, -4.0, 4.0)
-        at += 3
-        told[..., at] = np.clip((tips[..., 2] - resting_height(tips[..., 0])) / _CM, -3.0, 5.0)
-        at += 1
-        # Keys under it that nobody wants, on the one side and the other, and where it stands on.
-        apart = (key_centres()[:, 1] - tips[..., None, 1]) * mirror[..., None]
-        close = np.abs(apart) < _NEAR
-        unwanted = np.where(close & ~self._goal[frame], key_state, 0.0)
-        told[..., at] = np.where(apart < 0, unwanted, 0.0).max(axis=2)
-        told[..., at + 1] = np.where(apart >= 0, unwanted, 0.0).max(axis=2)
-        told[..., at + 2] = tips[..., 0] / 0.05
-        at += 3
-        neighbours = np.zeros((2, 7))
-        neighbours[:, 1:6] = now >= 0
-        soon = np.zeros((2, 7))
-        soon[:, 1:6] = pressing[_BEFORE + 1]
-        for index, row in enumerate((neighbours, soon)):
-            told[..., at + 2 * index] = row[:, :5]
-            told[..., at + 2 * index + 1] = row[:, 2:]
-        at += 4
+        error[..., 1] *= _MIRROR
+        apart = (along - tips[..., None, 1]) * _MIRROR[..., None]
+        unwanted = np.where((np.abs(apart) < _NEAR) & ~self._goal[frame], key_state, 0.0)
+        parts = {
+            "finger": np.broadcast_to(np.eye(FINGER_COUNT), (2, FINGER_COUNT, FINGER_COUNT)),
+            "presses": pressing.transpose(1, 2, 0),
+            "presses its present key": (pressing & (around == now)).transpose(1, 2, 0),
+            "distance to keys": np.where(pressing, beside, 0.0).transpose(1, 2, 0),
+            "key is black": ((now >= 0) & BLACK[own])[..., None],
+            "key state": np.where(now >= 0, key_state[own], 0.0)[..., None],
+            "tip error": _clip(error),
+            "height": _clip(tips[..., 2:] - resting_height(tips[..., :1]), -3.0, 5.0),
+            "unwanted keys": np.stack(
+                [np.where(side, unwanted, 0.0).max(axis=2) for side in (apart < 0, apart >= 0)],
+                axis=2,
+            ),
+            "place along the key": tips[..., :1] / _DEPTH,
+            "neighbours press": _of_neighbours(now >= 0),
+            "neighbours press next": _of_neighbours(pressing[_BEFORE + 1]),
+            **self._joints(qpos, qvel_hands, path),
+        }
+        row = np.concatenate([parts[name] for name in _PARTS], axis=2)
+        return row.astype(np.float32).reshape(AGENTS, SIZE)
+
+    def _joints(
+        self,
+        qpos: NDArray[np.float64],
+        qvel_hands: NDArray[np.float64],
+        path: NDArray[np.float64],
+    ) -> dict[str, NDArray[np.float64]]:
+        """The parts that are about joints, given their reference (2, 27) [rad, m]."""
+        errors, velocities = np.zeros((2, 2, FINGER_COUNT, _JOINTS))
+        forearm = np.empty((2, FINGER_COUNT, 2))
         for index in range(2):
-            hand = both_hands()[index]
-            joints = qpos[hand.joints]
-            first = hand.joints.start - KEYS
-            velocity = qvel_hands[first : first + LAYOUT.hand_joints]
-            for finger, which in enumerate(LAYOUT.finger_joints):
-                size = which.stop - which.start
-                row = told[index, finger]
-                row[at : at + size] = (path[index, which] - joints[which]) / 0.2
-                row[at + _JOINTS : at + _JOINTS + size] = velocity[which] * FRAME_SECONDS / 0.2
-            # Along the keyboard forearms slide alike, not as in a mirror.
-            slide = np.array([path[index, 0] - joints[0], velocity[0] * FRAME_SECONDS])
-            told[index, :, at + 2 * _JOINTS :] = np.clip(mirror[index] * slide / _CM, -4.0, 4.0)
-        return told.reshape(10, SIZE)
+            error = path[index] - qpos[LAYOUT.joints[index]]
+            velocity = qvel_hands[LAYOUT.among_hands(index)]
+            for finger, joints in enumerate(LAYOUT.finger_joints):
+                size = joints.stop - joints.start
+                errors[index, finger, :size] = error[joints] / _ANGLE
+                velocities[index, finger, :size] = velocity[joints] * FRAME_SECONDS / _ANGLE
+            # Along the keyboard both forearms slide the same way: only this is mirrored by hand.
+            slide = np.array([error[LAYOUT.slide], velocity[LAYOUT.slide] * FRAME_SECONDS])
+            forearm[index] = _clip(_MIRROR[index] * slide)
+        return {"joint errors": errors, "joint velocities": velocities, "forearm": forearm}
 
 
-def controls(said: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(46,) what fingers' actions (10, 5), -1..1, add to controls [rad]."""
-    added = np.zeros(46)
-    for row, action in enumerate(np.clip(said, -1.0, 1.0)):
-        hand, which = both_hands()[row // 5], LAYOUT.finger_actuators[row % 5]
-        mine = added[hand.actuators]
-        mine[which] = AMPLITUDE * action[: which.stop - which.start]
+def controls(actions: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The residual (46,) [rad] of actions (10, 5); actions beyond -1..1 are clipped."""
+    added = np.zeros(LAYOUT.ctrl_size)
+    for agent, action in enumerate(np.clip(actions, -1.0, 1.0)):
+        hand, finger = divmod(agent, FINGER_COUNT)
+        actuators = LAYOUT.finger_actuators[finger]
+        mine = added[both_hands()[hand].actuators]
+        mine[actuators] = AMPLITUDE * action[: actuators.stop - actuators.start]
     return added
 
 
 class FingerResidualTracker:
-    """The dynamic tracker, and what a policy adds to it.
+    """The dynamic tracker, and the residual that the finger policy adds.
 
     Args:
-        run: the policy: `told` (10, SIZE) to actions (10, 5).
+        policy: the network: `observation` (10, SIZE) to actions (10, 5).
+        base: the dynamic tracker; with the settings of the zero-shot player if None.
     """
 
-    def __init__(self, run: Inference) -> None:
-        self._run, self._tracker = run, DynamicTracker()
+    def __init__(self, policy: Inference, base: DynamicTracker | None = None) -> None:
+        self._policy, self._base = policy, base or DynamicTracker()
 
-    def begin(self, plan: FingertipPlan) -> None:
-        """Prepare the dynamic tracker."""
-        self._tracker.begin(plan)
-        self._surroundings = FingerObservation(plan, self._tracker)
+    def start(self, plan: FingertipPlan) -> FingerResidualController:
+        """A controller of a plan."""
+        return FingerResidualController(self._base.start(plan), self._policy)
+
+
+class FingerResidualController:
+    """Adds the finger policy's residual to a dynamic controller.
+
+    Args:
+        base: the dynamic controller.
+        policy: the network.
+    """
+
+    replayable: ClassVar[bool] = True
+
+    def __init__(self, base: DynamicController, policy: Inference) -> None:
+        self.plan = base.plan
+        self._base, self._policy = base, policy
+        self._observation = FingerObservation(base)
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """(46,) right then left."""
-        proposed, points = self._tracker.controls(np.array([frame]), world.qpos[None])
-        told = self._surroundings.look(
+        """(46,) right then left [rad, m]."""
+        base, points = self._base.controls(np.array([frame]), world.qpos[None])
+        observation = self._observation.encode(
             frame, world.qpos, world.qvel_hands, world.key_state, points[0]
         )
-        ctrl: NDArray[np.float64] = proposed[0] + controls(self._run({"told": told})[0])
+        actions = self._policy({"observation": observation})[0]
+        ctrl: NDArray[np.float64] = base[0] + controls(actions)
         return ctrl
+
+
+def _clip(length: NDArray[np.float64], low: float = -4.0, high: float = 4.0) -> NDArray[np.float64]:
+    """Lengths [m] in their unit, clipped."""
+    clipped: NDArray[np.float64] = np.clip(length / _LENGTH, low, high)
+    return clipped
+
+
+def _of_neighbours(pressing: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(2, 5, 2) what holds (2, 5) for the finger before and the finger after each."""
+    padded = np.zeros((2, FINGER_COUNT + 2))
+    padded[:, 1:-1] = pressing
+    return np.stack([padded[:, :-2], padded[:, 2:]], axis=2)

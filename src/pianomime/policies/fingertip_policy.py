@@ -1,4 +1,4 @@
-"""What a high level wants, frame after frame, and a planner that wants a whole song ahead."""
+"""Receding-horizon rollout of the high-level fingertip policy, and a planner of whole songs."""
 
 from __future__ import annotations
 
@@ -8,45 +8,48 @@ from numpy.typing import NDArray
 from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
-from pianomime.policies.features import high_inputs, rest_tips, to_world
+from pianomime.policies.features import fingertip_observation, rest_points, to_world_frame
 from pianomime.policies.finger_assignment import assign_fingers
-from pianomime.policies.horizon import CHUNK, HIGH_GOALS
+from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
 from pianomime.policies.policy import Policy
+from pianomime.world.layout import FINGER_COUNT, POINT_COUNT
 
 
 class FingertipRollout:
-    """Goes on, every frame, from where it last wanted the fingertips.
+    """Runs the fingertip policy frame after frame, each from its own output for the frame before.
 
     Attributes:
-        goal: (T + 10, 88) what the score wants, and silence.
-        tips: (2, 6, 3) where it wants points in the frame that it was asked for last [m].
-        pressing: (2, 5) the key that each finger presses there, -1 for none.
+        plan: the frames so far; later ones are at rest.
 
     Args:
         score: what is played.
-        high: says fingertips.
-        seed: of what is drawn.
+        policy: the fingertip policy.
+        seed: of its sampling.
     """
 
-    def __init__(self, score: Score, high: Policy, seed: int = 0) -> None:
-        self.goal = np.vstack([score.roll(), np.zeros((HIGH_GOALS, KEYS), bool)])
-        self.tips = rest_tips().copy()
-        self.pressing = np.full((2, 5), NO_KEY, np.int8)
-        self._high, self._draw = high, np.random.default_rng(seed)
+    def __init__(self, score: Score, policy: Policy, seed: int = 0) -> None:
+        self._goal = np.vstack([score.roll(), np.zeros((GOAL_HORIZON, KEYS), bool)])
+        self._policy, self._rng = policy, np.random.default_rng(seed)
+        self._points = rest_points()
+        self._pressing = no_keys()
+        self.plan = PlanRecord(score)
 
-    def ahead(self, frame: int) -> NDArray[np.float64]:
-        """(4, 2, 6, 3) points that it wants in this frame and the next; frames come in order."""
-        seen = high_inputs(self.goal[None, frame : frame + HIGH_GOALS], self.tips[None])
-        told = self._high.say(seen, self._draw)[0].reshape(-1, 2, 6, 3)
-        said = to_world(told.astype(np.float64))
-        targets, pressing = np.empty((CHUNK, 2, 6, 3)), self.pressing
+    def step(self, frame: int) -> NDArray[np.float64]:
+        """(4, 2, 6, 3) points [m] wanted in this frame and the next; frames come in order."""
+        observation = fingertip_observation(
+            self._goal[None, frame : frame + GOAL_HORIZON], self._points[None]
+        )
+        action = self._policy.act(observation, self._rng)[0].reshape(-1, 2, POINT_COUNT, 3)
+        points = to_world_frame(action.astype(np.float64))
+        targets, pressing = np.empty((CHUNK, 2, POINT_COUNT, 3)), self._pressing
         for ahead in range(CHUNK):
             targets[ahead], pressing = assign_fingers(
-                said[ahead], self.goal[frame + ahead], pressing
+                points[ahead], self._goal[frame + ahead], pressing
             )
             if ahead == 0:
-                self.pressing = pressing
-        self.tips = targets[0]
+                self._pressing = pressing
+        self._points = targets[0]
+        self.plan.write(frame, self._points, self._pressing)
         return targets
 
 
@@ -54,38 +57,55 @@ class LearnedPlanner:
     """Plans a whole song before it is played, as the published code does.
 
     Args:
-        high: says fingertips.
-        seed: of what is drawn.
+        policy: the fingertip policy.
+        seed: of its sampling.
     """
 
-    def __init__(self, high: Policy, seed: int = 0) -> None:
-        self._high, self._seed = high, seed
+    def __init__(self, policy: Policy, seed: int = 0) -> None:
+        self._policy, self._seed = policy, seed
 
     def plan(self, score: Score) -> FingertipPlan:
         """One row for each frame of `score.roll()`."""
-        wanting, plan = FingertipRollout(score, self._high, self._seed), empty_plan(score)
-        for frame in range(len(plan)):
-            wanting.ahead(frame)
-            plan.fingertips[frame], plan.finger_key[frame] = wanting.tips, wanting.pressing
-        name_fingers(plan, score)
-        return plan
+        rollout = FingertipRollout(score, self._policy, self._seed)
+        for frame in range(score.frames()):
+            rollout.step(frame)
+        return rollout.plan.plan()
 
 
-def empty_plan(score: Score) -> FingertipPlan:
-    """A plan at rest, to be written into."""
-    frames, none = score.frames(), np.full(len(score), -1, np.int8)
-    return FingertipPlan(
-        np.tile(rest_tips(), (frames, 1, 1, 1)),
-        np.full((frames, 2, 5), NO_KEY, np.int8),
-        none,
-        none.copy(),
-    )
+class PlanRecord:
+    """A plan that becomes known frame by frame, at rest where it is not known yet.
+
+    Args:
+        score: what is played.
+    """
+
+    def __init__(self, score: Score) -> None:
+        self._score = score
+        self._points = np.tile(rest_points(), (score.frames(), 1, 1, 1))
+        self._finger_key = np.tile(no_keys(), (score.frames(), 1, 1))
+
+    def write(self, frame: int, points: NDArray[np.float64], finger_key: NDArray[np.int8]) -> None:
+        """Write one frame.
+
+        Args:
+            frame: its number.
+            points: (2, 6, 3) of the hands [m].
+            finger_key: (2, 5) the key that each finger presses, -1 for none.
+        """
+        self._points[frame], self._finger_key[frame] = points, finger_key
+
+    def plan(self) -> FingertipPlan:
+        """The plan so far; each note is played by the first finger that presses its key."""
+        hand = np.full(len(self._score), -1, np.int8)
+        finger = hand.copy()
+        notes = zip(self._score.key, *self._score.note_frames().T, strict=True)
+        for note, (key, first, end) in enumerate(notes):
+            played = np.argwhere(self._finger_key[first:end] == key)
+            if len(played):
+                hand[note], finger[note] = played[0, 1:]
+        return FingertipPlan(self._points.copy(), self._finger_key.copy(), hand, finger)
 
 
-def name_fingers(plan: FingertipPlan, score: Score) -> None:
-    """Write who plays them into a plan: for each note the first finger that presses its key."""
-    notes = zip(score.key, *score.note_frames().T, strict=True)
-    for note, (key, first, end) in enumerate(notes):
-        played = np.argwhere(plan.finger_key[first:end] == key)
-        if len(played):
-            plan.note_hand[note], plan.note_finger[note] = played[0, 1:]
+def no_keys() -> NDArray[np.int8]:
+    """(2, 5) keys of fingers that press nothing."""
+    return np.full((2, FINGER_COUNT), NO_KEY, np.int8)

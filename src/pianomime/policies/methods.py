@@ -1,20 +1,17 @@
-"""The players that have learned to play every song, and where their weights are."""
+"""The methods that play with learned policies, and where the policies' weights are."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pianomime.errors import InputError
+from pianomime.policies.finger_residual import FingerResidualTracker
+from pianomime.policies.policy import load_network, load_policy
+from pianomime.policies.policy_tracker import PolicyTracker
+from pianomime.policies.sampler import Sampler
 
-if TYPE_CHECKING:
-    from pianomime.policies.finger_residual import FingerResidualTracker
-    from pianomime.policies.policy_tracker import PolicyTracker
-    from pianomime.policies.sampler import Sampler
-    from pianomime.policies.two_stage import Generalist
-
-METHODS: dict[str, tuple[str, ...]] = {
+GENERALISTS: dict[str, tuple[str, ...]] = {
     "two-stage-diff": ("high-diff", "low-diff"),
     "two-stage-diff-no-sdf": ("high-diff-no-sdf", "low-diff-no-sdf"),
     "two-stage-diff-res": ("high-diff", "low-diff-res"),
@@ -24,107 +21,90 @@ METHODS: dict[str, tuple[str, ...]] = {
     "bc-mse": ("bc-mse",),
     "multi-task-sac": ("multi-task-sac",),
 }
-"""The stages of each method: from goals to fingertips and on to controls, or from goals to controls
-at once (appendix G)."""
+"""The policies of each generalist: from goals to fingertips and on to controls, or from goals
+straight to controls (paper, appendix G)."""
 
 FINGERS = "fingers"
-"""The player with one learned residual for every finger; a stage of the same name."""
+"""The player with the finger residual, and its policy."""
 
-_TRAINED_BY = {FINGERS: "train-fingers", "multi-task-sac": "train-sac"}
-"""The command that makes a stage, where it is not `train`."""
+METHODS: dict[str, tuple[str, ...]] = {FINGERS: (FINGERS,), **GENERALISTS}
+"""The policies of every learned player."""
 
 WEIGHTS = "PIANOMIME_WEIGHTS"
-"""Name of the environment variable that tells a folder of weights other than those that came with
-the program."""
+"""The environment variable that names a folder of weights other than those in the package."""
 
-_SAMPLERS = ((2, 0.0), (5, 0.0), (20, 0.0), (100, 1.0))
-"""Steps and eta of a `Sampler`, by effort; the last one is the paper's."""
+SAMPLERS = (Sampler(2), Sampler(5), Sampler(20), Sampler(100, eta=1.0))
+"""How a diffusion is sampled, by effort; the last one is the paper's."""
+
+_TRAINED_BY = {FINGERS: "train-fingers", "multi-task-sac": "train-sac"}
+"""The command that trains a policy, where it is not `train POLICY`."""
 
 
-def make_generalist(method: str, effort: int, seed: int = 0) -> Generalist:
-    """A player by the name of its method.
+def load_finger_tracker(weights: Path | None = None) -> FingerResidualTracker:
+    """The tracker with the finger residual.
 
     Args:
-        method: one of `METHODS`.
-        effort: 0 to 3: how many steps a diffusion is run.
-        seed: of what it draws.
+        weights: folder of the weights; see `weights_folder`.
 
     Raises:
         InputError: its weights are not there, or cannot be read.
     """
-    # Late, for every player's module asks for the names of all.
-    from pianomime.policies.policy import load_policy
-    from pianomime.policies.sampler import Sampler
-    from pianomime.policies.two_stage import Generalist
-
-    *high, low = METHODS[method]
-    sampler = Sampler(*_SAMPLERS[effort])
-    follower = load_policy_tracker(stage_path(low), sampler, seed, low)
-    wanting = load_policy(stage_path(high[0]), sampler, high[0]) if high else None
-    return Generalist(follower, wanting, seed)
-
-
-def make_fingers() -> FingerResidualTracker:
-    """The tracker with the learned residual of fingers.
-
-    Raises:
-        InputError: its weights are not there, or cannot be read.
-    """
-    from pianomime.policies.finger_residual import FingerResidualTracker
-    from pianomime.policies.policy import load_network
-
-    return FingerResidualTracker(load_network(stage_path(FINGERS), FINGERS)[0])
-
-
-def weight_files(player: str) -> list[Path]:
-    """The files that decide how a player plays; none for players that have learned nothing.
-
-    Raises:
-        InputError: one is not there.
-    """
-    stages = (FINGERS,) if player == FINGERS else METHODS.get(player, ())
-    return [stage_path(stage) for stage in stages]
+    return FingerResidualTracker(load_network(policy_path(FINGERS, weights), FINGERS)[0])
 
 
 def load_policy_tracker(
-    path: Path, sampler: Sampler | None = None, seed: int = 0, stage: str = ""
+    path: Path, sampler: Sampler | None = None, seed: int = 0, name: str = ""
 ) -> PolicyTracker:
-    """The tracker of a file of a low level, or of a policy of one stage.
+    """The tracker of a low-level policy, or of one that goes from goals straight to controls.
 
     Args:
-        path: of the file.
-        sampler: how a diffusion is run.
-        seed: of what is drawn.
-        stage: that the file must hold; any if not given.
+        path: of the .onnx file.
+        sampler: how a diffusion is sampled.
+        seed: of the sampling.
+        name: of the policy that the file must hold; any if not given.
 
     Raises:
-        InputError: it is damaged, or holds another stage, or says something else than controls.
+        InputError: it is damaged, or holds another policy, or one that does not output controls.
     """
-    from pianomime.policies.policy import load_policy
-    from pianomime.policies.policy_tracker import PolicyTracker
-
-    policy = load_policy(path, sampler, stage)
-    if policy.about["level"] not in ("low", "whole"):
-        raise InputError(f"{path}: not a stage that says controls")
-    return PolicyTracker(policy, seed, policy.about["level"] == "low", policy.about["prior"])
+    policy = load_policy(path, sampler, name)
+    if policy.info.level not in ("low", "end-to-end"):
+        raise InputError(f"{path}: not a policy that outputs controls")
+    return PolicyTracker(policy, seed, policy.info.level == "low", policy.info.residual)
 
 
 def weights_folder() -> Path:
-    """Where weights are looked for."""
+    """The folder of weights, unless another one is given: that in the environment, or ours."""
     return Path(os.environ.get(WEIGHTS) or Path(__file__).with_name("weights"))
 
 
-def stage_path(stage: str) -> Path:
-    """The file of a stage.
+def policy_path(name: str, weights: Path | None = None) -> Path:
+    """The file of a policy.
+
+    Args:
+        name: of the policy, such as "low-diff".
+        weights: folder of the weights; see `weights_folder`.
 
     Raises:
         InputError: it is not there.
     """
-    path = weights_folder() / f"{stage}.onnx"
+    path = (weights or weights_folder()) / f"{name}.onnx"
     if not path.is_file():
-        command = _TRAINED_BY.get(stage, f"train {stage}")
+        command = _TRAINED_BY.get(name, f"train {name}")
         raise InputError(
             f"{path} is not there: train it with `pianomime {command}`, or name a folder of "
             f"weights in {WEIGHTS}"
         )
     return path
+
+
+def weight_files(method: str, weights: Path | None = None) -> list[Path]:
+    """The files of a method's policies.
+
+    Args:
+        method: one of `METHODS`.
+        weights: folder of the weights; see `weights_folder`.
+
+    Raises:
+        InputError: one is not there.
+    """
+    return [policy_path(name, weights) for name in METHODS[method]]

@@ -1,13 +1,15 @@
-"""Following fingertips with a learned policy: a tracker like any other."""
+"""A learned policy as a tracker: it outputs a chunk of controls in every frame anew."""
 
 from __future__ import annotations
+
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import KEYS
 from pianomime.plan import FingertipPlan
-from pianomime.policies.features import low_inputs
+from pianomime.policies.features import tracking_observation
 from pianomime.policies.horizon import CHUNK
 from pianomime.policies.policy import Policy
 from pianomime.track import IkTracker
@@ -16,56 +18,73 @@ from pianomime.world.hand import hand_points
 
 
 class PolicyTracker:
-    """Asks a policy for a chunk of controls in every frame anew, and plays the first of them.
+    """Asks a policy for a chunk of controls in every frame, and plays the first of them.
 
     Args:
-        policy: of the low level, or of one stage.
-        seed: of what is drawn: with the frame, for a tracker may be asked for a frame twice.
-        fingertips: whether the policy is told where fingertips are to go.
-        prior: whether controls are told as what to add to those of inverse kinematics.
+        policy: a low-level policy, or one that goes from goals to controls.
+        seed: of the policy's sampling. Together with the frame it seeds every frame anew, so that
+            the controller is replayable.
+        fingertips: whether the policy observes the targets of the fingertips.
+        residual: whether the policy outputs a residual that is added to inverse kinematics.
     """
 
     def __init__(
-        self, policy: Policy, seed: int = 0, fingertips: bool = True, prior: bool = False
+        self, policy: Policy, seed: int = 0, fingertips: bool = True, residual: bool = False
     ) -> None:
         self._policy, self._seed, self._fingertips = policy, seed, fingertips
-        self._ik = IkTracker() if prior else None
+        self._ik = IkTracker() if residual else None
 
-    def begin(self, plan: FingertipPlan) -> None:
-        """Take the plan's fingertips, and the keys that it presses as goals."""
-        self._plan = plan
-        self._goal = np.vstack([plan.keys(), np.zeros((CHUNK - 1, KEYS), bool)])
-        if self._ik is not None:
-            self._ik.begin(plan)
+    def start(self, plan: FingertipPlan) -> PolicyController:
+        """A controller whose goals are the keys that the plan presses."""
+        return PolicyController(plan, self)
 
-    def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """(46,) right then left."""
-        ahead = np.minimum(np.arange(frame, frame + CHUNK), len(self._plan) - 1)
-        targets = self._plan.fingertips[ahead]
-        return self.say(frame, world, self._goal[frame : frame + CHUNK], targets)
-
-    def say(
+    def act(
         self, frame: int, world: World, goal: NDArray[np.bool_], targets: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(46,) right then left.
+        """The control of one frame.
 
         Args:
-            frame: which.
-            world: as it is.
-            goal: (4, 88) of this frame and those that follow.
-            targets: (4, 2, 6, 3) where fingertips are to be in these frames [m].
+            frame: its number, for the seed.
+            world: as it is before the frame.
+            goal: (4, 88) goals of this frame and the next.
+            targets: (4, 2, 6, 3) points of the hands wanted in these frames [m].
+
+        Returns:
+            (46,) right then left [rad, m].
         """
-        prior = None if self._ik is None else self._ik.control(frame, world)
         joints = world.qpos_hands[None]
-        seen = low_inputs(
+        base = None if self._ik is None else self._ik.solve(world.qpos[None], targets[:1])[0]
+        observation = tracking_observation(
             goal[None],
             targets[None] if self._fingertips else None,
             hand_points(joints),
             joints,
             world.qvel_hands[None],
             world.key_state[None],
-            None if prior is None else prior[None],
+            base,
         )
-        draw = np.random.default_rng([self._seed, frame])
-        ctrl: NDArray[np.float64] = self._policy.say(seen, draw)[0, 0].astype(np.float64)
-        return ctrl if prior is None else ctrl + prior
+        rng = np.random.default_rng([self._seed, frame])
+        ctrl: NDArray[np.float64] = self._policy.act(observation, rng)[0, 0].astype(np.float64)
+        return ctrl if base is None else ctrl + base[0]
+
+
+class PolicyController:
+    """Follows a whole plan with a policy.
+
+    Args:
+        plan: what is followed.
+        tracker: whose policy acts.
+    """
+
+    replayable: ClassVar[bool] = True
+
+    def __init__(self, plan: FingertipPlan, tracker: PolicyTracker) -> None:
+        self.plan = plan
+        self._tracker = tracker
+        self._goal = np.vstack([plan.keys(), np.zeros((CHUNK - 1, KEYS), bool)])
+
+    def control(self, frame: int, world: World) -> NDArray[np.float64]:
+        """(46,) right then left [rad, m]."""
+        ahead = np.minimum(np.arange(frame, frame + CHUNK), len(self.plan) - 1)
+        goal = self._goal[frame : frame + CHUNK]
+        return self._tracker.act(frame, world, goal, self.plan.fingertips[ahead])

@@ -1,19 +1,23 @@
-"""Trackers: from a FingertipPlan to controls."""
+"""Trackers: from a FingertipPlan to a Controller."""
 
-from pianomime.track.batch import BatchTracker
+from pianomime.track.controller import BatchController, Controller, PedalController
 from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
 from pianomime.track.predictive_sampling import PredictiveSamplingConfig, PredictiveSamplingTracker
-from pianomime.track.tracker import PedalTracker, Tracker
+from pianomime.track.replay import ReplayTracker
+from pianomime.track.tracker import BatchTracker, Tracker
 
 __all__ = [
+    "BatchController",
     "BatchTracker",
+    "Controller",
     "DynamicConfig",
     "DynamicTracker",
     "IkConfig",
     "IkTracker",
-    "PedalTracker",
+    "PedalController",
     "PredictiveSamplingConfig",
     "PredictiveSamplingTracker",
+    "ReplayTracker",
     "Tracker",
 ]

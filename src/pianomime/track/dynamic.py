@@ -21,77 +21,96 @@ from pianomime.plan.joint_path import (
     resting_height,
     smooth_path,
 )
+from pianomime.validation import finite
 from pianomime.world import World
 from pianomime.world.hand import Hand
-from pianomime.world.layout import LAYOUT
+from pianomime.world.layout import LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
 
-# Forearm slides and wrist, the first joints of a hand.
-_ARM_JOINTS = 5
-# The forearm's slide along the keyboard.
-_SLIDE = 0
-# [m] Lifts of a fingertip per radian that count as nothing.
 _LIFT_DAMPING = 0.01
+"""[m/rad] Damping of the lift: joints that raise a fingertip by less hardly move."""
 
 
 @dataclass(frozen=True)
 class DynamicConfig:
-    """The dynamic tracker."""
+    """Settings of the dynamic tracker."""
 
     path: PathConfig = field(default_factory=PathConfig)
     depth: float = 0.018
-    """[m] below the resting key's top that a pressing fingertip aims."""
+    """Depth below the top of the resting key at which a pressing fingertip aims [m]."""
     force: float = 5.0
-    """[N] downward on a pressed key."""
+    """Downward force on a pressed key [N]."""
     joint_feedback: float = 0.5
-    """Share of the joint error that is added to the control."""
+    """Gain of the joint-position feedback."""
     tip_feedback: float = 0.5
-    """Share of each fingertip's error that its own joints are sent to make good."""
+    """Gain of the fingertip-position feedback on the finger's own joints."""
     tip_damping: float = 0.03
-    """[m] Moves of a fingertip per radian that count as nothing, in that."""
+    """Damping of the fingertip-position feedback [m/rad]."""
     tip_error: float = 0.02
-    """[m] Error of a fingertip that is made good at most."""
+    """Fingertip errors are clipped to this length [m]."""
     astray: float = 0.009
-    """[m] beside its key from where a fingertip must not press."""
+    """A finger further than this beside its key does not press, but is lifted [m]."""
     sunk: float = 0.005
-    """[m] below the tops of the keys from where an idle fingertip must come up."""
+    """An idle fingertip further than this below the tops of the keys is lifted [m]."""
     clear: float = 0.005
-    """[m] above the keys that such fingertips are lifted."""
+    """Height above the keys to which such fingertips are lifted [m]."""
+
+    def __post_init__(self) -> None:
+        finite(self)
 
 
 class DynamicTracker:
-    """Follows any fingertip plan, a planner's or a human's."""
+    """Follows any fingertip plan, a planner's or a human's.
+
+    Args:
+        config: its settings; those of the zero-shot player if None.
+    """
 
     def __init__(self, config: DynamicConfig | None = None) -> None:
         self.config = config or DynamicConfig()
         self._hands = [Hand(side) for side in SIDES]
 
-    def begin(self, plan: FingertipPlan) -> None:
-        """Work out the joint paths and the controls that follow them, from the rest pose."""
-        self._finger_key = plan.finger_key
+    def start(self, plan: FingertipPlan) -> DynamicController:
+        """A controller with joint paths and the feed-forward controls that follow them."""
+        return DynamicController(plan, self.config, self._hands)
+
+
+class DynamicController:
+    """Feed-forward controls of one plan, and feedback of the present errors.
+
+    Args:
+        plan: what is followed.
+        config: settings.
+        hands: (left, right), for kinematics; their pose is not preserved.
+    """
+
+    replayable = True
+
+    def __init__(self, plan: FingertipPlan, config: DynamicConfig, hands: list[Hand]) -> None:
+        self.plan, self.config = plan, config
+        self._hands = hands
         self._paths = []
         self._tips = []
-        self._feedforward = np.empty((len(plan), 46))
+        self._feedforward = np.empty((len(plan), LAYOUT.ctrl_size))
         self._press = []
         for index, hand in enumerate(self._hands):
             pressing = plan.finger_key[:, index] >= 0
-            targets, weights = self._wishes(plan.fingertips[:, index], plan.finger_key[:, index])
+            targets, weights = self._targets(plan.fingertips[:, index], plan.finger_key[:, index])
             clearance = np.full(pressing.shape, np.nan)
-            path = smooth_path(
-                hand, np.zeros(LAYOUT.hand_joints), targets, weights, clearance, self.config.path
-            )
+            start = np.zeros(LAYOUT.hand_joints)
+            path = smooth_path(hand, start, targets, weights, clearance, config.path)
             self._paths.append(path)
             self._tips.append(np.array([hand.points(pose)[1:] for pose in path]))
             torque = motion_torque(hand, path)
-            press = self.config.force * press_torque(hand, path[1:], pressing)
+            press = config.force * press_torque(hand, path[1:], pressing)
             self._press.append(to_actuators(hand, press) / hand.gain)
             middle = (path[1:] + path[:-1]) / 2
             ctrl = middle @ hand.to_ctrl.T + to_actuators(hand, torque) / hand.gain
             self._feedforward[:, hand.actuators] = ctrl
 
     def aim(self, frame: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Where fingertips (2, 5, 3) [m] and joints (2, 27) [rad, m] are to be before a frame."""
+        """Reference fingertips (2, 5, 3) [m] and joints (2, 27) [rad, m] before a frame."""
         return (
             np.array([tips[frame] for tips in self._tips]),
             np.array([path[frame] for path in self._paths]),
@@ -100,17 +119,19 @@ class DynamicTracker:
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) right then left: feed-forward, and a share of the present errors.
 
-        A finger that is not over the key it is to press would press, or be caught by, another
-        one: it is lifted above the keys until it has come across. So is an idle finger that
-        has sunk between the keys.
+        A finger that is not over its key would press another one or be caught by it: it is lifted
+        above the keys until it is over its key. So is an idle finger that has sunk between keys.
         """
         return self._control(frame, world.qpos)[0]
 
     def controls(
         self, frames: NDArray[np.int64], qpos: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As `BatchTracker.controls`: of one world after the other."""
-        ctrl, points = np.empty((len(frames), 46)), np.empty((len(frames), 2, 6, 3))
+        """As `BatchController.controls`: one world after the other."""
+        ctrl, points = (
+            np.empty((len(frames), LAYOUT.ctrl_size)),
+            np.empty((len(frames), 2, POINT_COUNT, 3)),
+        )
         for row, frame in enumerate(frames):
             ctrl[row], points[row] = self._control(int(frame), qpos[row])
         return ctrl, points
@@ -120,15 +141,15 @@ class DynamicTracker:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The control (46,) and the points (2, 6, 3) of the hands."""
         ctrl: NDArray[np.float64] = self._feedforward[frame].copy()
-        points = np.empty((2, 6, 3))
+        points = np.empty((2, POINT_COUNT, 3))
         for index, hand in enumerate(self._hands):
             here = qpos[hand.joints]
             points[index], jacobian = hand.points_and_jacobian(here)
             tips, jacobian = points[index, 1:], jacobian[1:]
             # A finger corrects itself, and only what pressing fingers have in common is left to
             # the forearm: moving it moves all of them.
-            jacobian[..., :_ARM_JOINTS] = 0.0
-            keys = self._finger_key[frame, index]
+            jacobian[..., : LAYOUT.arm_joints] = 0.0
+            keys = self.plan.finger_key[frame, index]
             error = self._tips[index][frame] - tips
             beside = np.abs(tips[:, 1] - key_centres()[keys, 1]) > self.config.astray
             low = tips[:, 2] < resting_height(tips[:, 0]) - self.config.sunk
@@ -136,7 +157,7 @@ class DynamicTracker:
             move = self.config.joint_feedback * (self._paths[index][frame] - here)
             move += self._reach(jacobian, error)
             limit = self.config.tip_error
-            move[_SLIDE] += _shared(np.clip(error[keys >= 0, 1], -limit, limit))
+            move[LAYOUT.slide] += _shared(np.clip(error[keys >= 0, 1], -limit, limit))
             move += self._lift(jacobian[lift, 2])
             press = self._press[index][frame][~lift].sum(axis=0)
             ctrl[hand.actuators] += hand.to_ctrl @ move + press
@@ -145,7 +166,7 @@ class DynamicTracker:
     def _reach(
         self, jacobian: NDArray[np.float64], error: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """(27,) joint displacement that makes good a share of the tips' errors (5, 3) [m]."""
+        """(27,) joint displacement that reduces the errors (5, 3) of the fingertips [m]."""
         size = np.linalg.norm(error, axis=1, keepdims=True)
         error = error * np.minimum(1.0, self.config.tip_error / np.maximum(size, 1e-9))
         gram = jacobian @ jacobian.transpose(0, 2, 1) + self.config.tip_damping**2 * np.eye(3)
@@ -155,13 +176,13 @@ class DynamicTracker:
         return move
 
     def _lift(self, upward: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(27,) joint displacement that lifts fingers, given what their joints raise (F, 27)."""
+        """(27,) joint displacement that lifts F fingers; their vertical Jacobian is (F, 27)."""
         height = self.config.depth + self.config.clear
         strength = (upward**2).sum(axis=1, keepdims=True) + _LIFT_DAMPING**2
         lift: NDArray[np.float64] = (height * upward / strength).sum(axis=0)
         return lift
 
-    def _wishes(
+    def _targets(
         self, points: NDArray[np.float64], finger_key: NDArray[np.int8]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         targets = points.copy()
@@ -175,10 +196,10 @@ class DynamicTracker:
 
 
 def _shared(error: NDArray[np.float64]) -> float:
-    """How far [m] the forearm goes to take the errors of pressing fingers (F,) [m] off them.
+    """The part of the errors of F pressing fingers that the forearm corrects [m].
 
-    Stretched fingers are at the end of what their joints can do: only the forearm can help, all
-    of them alike. Of the error of a single finger it takes half.
+    Stretched fingers are at the end of what their joints can do: only the forearm can help them,
+    all alike. Of the error of a single finger it corrects half.
     """
     return float(error.sum()) / (len(error) + 1)
 

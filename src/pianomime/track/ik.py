@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.plan import FingertipPlan
+from pianomime.validation import finite
 from pianomime.world import World
 from pianomime.world.hand import Hand
+from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 
 
@@ -26,11 +29,17 @@ class IkConfig:
     lm_damping: float = 1e-6
     """Levenberg-Marquardt damping, as a factor of the weighted squared error."""
 
+    def __post_init__(self) -> None:
+        finite(self)
+
 
 class IkTracker:
     """Sends the joint positions that one Gauss-Newton step takes toward the fingertip targets.
 
     The step minimises `sum_i |W_i (J_i dq - e_i)|^2 + damping |dq|^2` within the joint limits.
+
+    Args:
+        config: weights of the quadratic program; the paper's if None.
     """
 
     def __init__(self, config: IkConfig | None = None) -> None:
@@ -39,33 +48,35 @@ class IkTracker:
         self._low, self._high = (
             np.array([getattr(hand, end) for hand in self._hands]) for end in ("low", "high")
         )
-        self._targets = np.empty((0, 2, 6, 3))
-        tips = np.full((5, 3), self.config.tip_weight)
+        tips = np.full((FINGER_COUNT, 3), self.config.tip_weight)
         self._weights = np.vstack([self.config.wrist_weight, tips])
 
-    def begin(self, plan: FingertipPlan) -> None:
-        """Take the plan's fingertip targets."""
-        self._targets = plan.fingertips
+    def start(self, plan: FingertipPlan) -> IkController:
+        """A controller that steps toward the plan's fingertips."""
+        return IkController(plan, self)
 
-    def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """(46,) right then left: where one step from the present pose leads [rad, m]."""
-        ctrl: NDArray[np.float64] = self.controls(np.array([frame]), world.qpos[None])[0][0]
-        return ctrl
-
-    def controls(
-        self, frames: NDArray[np.int64], qpos: NDArray[np.float64]
+    def solve(
+        self, qpos: NDArray[np.float64], targets: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """As `BatchTracker.controls`: of all worlds and both hands in one pass over arrays."""
+        """One step of n worlds and both hands, in one pass over arrays.
+
+        Args:
+            qpos: (n, 142) positions, as in `World.qpos` [rad, m].
+            targets: (n, 2, 6, 3) where wrists and fingertips should be [m].
+
+        Returns:
+            The controls (n, 46) [rad, m] and the points (n, 2, 6, 3) [m] at `qpos`.
+        """
         here = np.stack([qpos[:, hand.joints] for hand in self._hands], axis=1)
-        points = np.empty((*here.shape[:2], 6, 3))
+        points = np.empty((*here.shape[:2], POINT_COUNT, 3))
         jacobian = np.empty((*points.shape, here.shape[2]))
         for index, hand in enumerate(self._hands):
             for row in range(len(here)):
                 points[row, index], jacobian[row, index] = hand.points_and_jacobian(
                     here[row, index]
                 )
-        there = self._steps(here, points, jacobian, self._targets[frames], self._low, self._high)
-        ctrl = np.empty((len(here), 46))
+        there = self._steps(here, points, jacobian, targets, self._low, self._high)
+        ctrl = np.empty((len(here), LAYOUT.ctrl_size))
         for index, hand in enumerate(self._hands):
             ctrl[:, hand.actuators] = (hand.to_ctrl @ there[:, index, :, None])[..., 0]
         return ctrl, points
@@ -93,6 +104,31 @@ class IkTracker:
         # Every point task adds its own damping, proportional to its own squared error.
         damping = self.config.damping + self.config.lm_damping * square
         return qpos + bounded_least_squares(weighted, error, damping, low - qpos, high - qpos)
+
+
+@dataclass(frozen=True, eq=False)
+class IkController:
+    """One step of inverse kinematics in every frame.
+
+    Attributes:
+        plan: what is followed.
+        tracker: whose step it is.
+    """
+
+    plan: FingertipPlan
+    tracker: IkTracker
+    replayable: ClassVar[bool] = True
+
+    def control(self, frame: int, world: World) -> NDArray[np.float64]:
+        """(46,) right then left: where one step from the present pose leads [rad, m]."""
+        ctrl: NDArray[np.float64] = self.controls(np.array([frame]), world.qpos[None])[0][0]
+        return ctrl
+
+    def controls(
+        self, frames: NDArray[np.int64], qpos: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """As `BatchController.controls`."""
+        return self.tracker.solve(qpos, self.plan.fingertips[frames])
 
 
 def bounded_least_squares(

@@ -1,8 +1,9 @@
-"""Improve a tracker's controls by trying variations of them before they are played.
+"""Predictive sampling: variations of a controller's controls are tried before they are played.
 
-The tracker is followed a little way ahead in a copy of the world. Where keys would go wrong,
-variations of its controls are rolled out side by side, and the best is taken (predictive
-sampling, with a good first guess). Where nothing goes wrong it costs one rollout.
+The base controller is followed a little way ahead in a copy of the world. Where keys would go
+wrong, variations of its controls are rolled out side by side and the best is taken (Howell et al.,
+"Predictive sampling: real-time behaviour synthesis with MuJoCo", 2022), with the base controls as
+the first guess. Where nothing goes wrong it costs one rollout.
 """
 
 from __future__ import annotations
@@ -12,51 +13,55 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.errors import InputError
 from pianomime.plan import FingertipPlan
+from pianomime.track.controller import Controller
 from pianomime.track.tracker import Tracker
+from pianomime.validation import finite
 from pianomime.world import World, WorldBatch
-from pianomime.world.hand import Hand, by_actuator
+from pianomime.world.hand import by_actuator
 from pianomime.world.layout import LAYOUT
-from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
-
-# Actuators of a hand: wrist and forearm.
-_ARM = [0, 1, 20, 21, 22]
 
 
 @dataclass(frozen=True)
 class PredictiveSamplingConfig:
-    """How hard to try."""
+    """The sampling budget, and the distribution of the variations."""
 
     variations: int = 16
     """Variations that are rolled out side by side."""
     rounds: int = 2
-    """Times that variations of the best so far are drawn: more of these gain more than more
-    variations in each."""
+    """Rounds of variations, each around the best so far: rounds gain more than variations do."""
     commit: int = 4
     """Frames that are played before looking ahead again."""
     ahead: int = 8
     """Frames that are looked ahead."""
     knots: int = 4
-    """Frames between the points that a variation is drawn at."""
+    """Frames between the knots of a variation, which is linear between them."""
     joint: float = 0.2
-    """[rad] Standard deviation of a variation, of finger joints;"""
+    """Standard deviation of variations of the fingers' actuators [rad]."""
     wrist: float = 0.06
-    """[rad] of the wrist;"""
+    """Standard deviation of variations of the wrists' actuators [rad]."""
     slide: float = 0.006
-    """[m] of the forearm."""
+    """Standard deviation of variations of the forearms' slides [m]."""
     blamed: float = 0.7
-    """Chance that an actuator of a finger that goes wrong is varied;"""
+    """Probability that an actuator of a finger that goes wrong is varied."""
     arm: float = 0.3
-    """of its wrist and forearm;"""
+    """Probability that an actuator of its wrist and forearm is varied."""
     others: float = 0.1
-    """of the hand's other fingers."""
+    """Probability that an actuator of another finger of its hand is varied."""
     seed: int = 0
-    """Of what is drawn."""
+    """Seed of the variations."""
+
+    def __post_init__(self) -> None:
+        finite(self)
+        for name in ("variations", "rounds", "commit", "ahead", "knots"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} must be 1 or more, not {getattr(self, name)}")
 
     @classmethod
     def of_effort(cls, effort: int) -> PredictiveSamplingConfig:
-        """The settings of efforts 1 to 3: each tries several times as much as the one before."""
+        """The budgets of efforts 1 to 3: each is several times the one before."""
         return {
             1: cls(),
             2: cls(rounds=6),
@@ -65,17 +70,11 @@ class PredictiveSamplingConfig:
 
 
 class PredictiveSamplingTracker:
-    """Plays what another tracker would, but for the variations that hit more keys.
-
-    The other tracker is asked for frames ahead of time, more than once, on copies of the world:
-    its controls must depend on plan, frame and world alone.
-
-    Attributes:
-        steps: control steps that were simulated to look ahead since the last `begin`.
+    """Follows plans as another tracker does, but for the variations that hit more keys.
 
     Args:
-        tracker: whose controls to improve.
-        config: how hard to try.
+        tracker: whose controls to improve; its controllers must be replayable.
+        config: the sampling budget.
         goal: (T, 88) bool, the keys that should be down; those that the plan presses if None.
         threads: how many variations step at the same time; 0 for one on each core.
     """
@@ -88,23 +87,60 @@ class PredictiveSamplingTracker:
         threads: int = 0,
     ) -> None:
         self.config = config or PredictiveSamplingConfig()
-        self.steps = 0
-        self._asked = goal
-        self._threads = threads
-        self._tracker = tracker
-        self._hands = [Hand(side) for side in SIDES]
-        size = self.config
-        self._spread = by_actuator(size.joint, size.wrist, size.slide)
+        self._tracker, self._goal, self._threads = tracker, goal, threads
 
-    def begin(self, plan: FingertipPlan) -> None:
-        """Prepare the tracker; draw the same variations for the same plan."""
-        self._tracker.begin(plan)
-        self._batch = WorldBatch(self.config.variations, self._threads, quiet=True)
-        self._goal = plan.keys() if self._asked is None else self._asked
-        self._finger_key = plan.finger_key
-        self._along = plan.fingertips[:, :, 1:, 1]
-        self._rng = np.random.default_rng(self.config.seed)
+    def start(self, plan: FingertipPlan) -> PredictiveSamplingController:
+        """A controller; for the same plan it draws the same variations.
+
+        Raises:
+            InputError: the other tracker's controller is not replayable.
+        """
+        goal = plan.keys() if self._goal is None else self._goal
+        return PredictiveSamplingController(
+            self._tracker.start(plan), self.config, goal, self._threads
+        )
+
+
+class PredictiveSamplingController:
+    """Improves a replayable controller.
+
+    It commits to a few frames at a time and draws random numbers, so it is not replayable itself.
+
+    Attributes:
+        steps: control steps that were simulated to look ahead so far.
+
+    Args:
+        base: the controller to improve.
+        config: the sampling budget.
+        goal: (T, 88) bool, the keys that should be down.
+        threads: how many variations step at the same time; 0 for one on each core.
+
+    Raises:
+        InputError: `base` is not replayable.
+    """
+
+    replayable = False
+
+    def __init__(
+        self,
+        base: Controller,
+        config: PredictiveSamplingConfig,
+        goal: NDArray[np.bool_],
+        threads: int = 0,
+    ) -> None:
+        if not base.replayable:
+            raise InputError(
+                f"predictive sampling needs a replayable controller, which {type(base).__name__} "
+                "is not: it cannot be asked ahead on copies of the world"
+            )
+        self.config = config
+        self.plan = base.plan
         self.steps = 0
+        self._base, self._goal = base, goal
+        self._spread = by_actuator(config.joint, config.wrist, config.slide)
+        self._batch = WorldBatch(config.variations, threads, quiet=True)
+        self._along = self.plan.fingertips[:, :, 1:, 1]
+        self._rng = np.random.default_rng(config.seed)
         self._ctrl: list[NDArray[np.float64]] = []
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
@@ -120,30 +156,30 @@ class PredictiveSamplingTracker:
         ctrl = np.empty((len(goal), world.model.nu))
         pressed = np.empty_like(goal)
         for step in range(len(goal)):
-            ctrl[step] = self._tracker.control(frame + step, ahead)
+            ctrl[step] = self._base.control(frame + step, ahead)
             ahead.step(ctrl[step])
             pressed[step] = ahead.pressed
         self.steps += len(goal)
         wrong = pressed != goal
         if not wrong[: self.config.commit + 2].any():
             return ctrl
-        moment = world.state()
-        chance = self._chances(frame, wrong)
+        state = world.state()
+        probability = self._probabilities(frame, wrong)
         for _ in range(self.config.rounds):
-            tries = ctrl + self._variations(len(goal), chance)
+            tries = ctrl + self._variations(len(goal), probability)
             tries[0] = ctrl
-            cost = self._cost(moment, tries, goal)
+            cost = self._cost(state, tries, goal)
             ctrl = tries[int(np.argmin(cost))]
         return ctrl
 
     def _cost(
         self,
-        moment: NDArray[np.float64],
+        state: NDArray[np.float64],
         ctrl: NDArray[np.float64],
         goal: NDArray[np.bool_],
     ) -> NDArray[np.float64]:
-        """(B,) what each of the controls (B, H, 46) does wrong from a moment on."""
-        self._batch.set_state(moment)
+        """(B,) cost of each of the controls (B, H, 46) from a state on."""
+        self._batch.set_state(state)
         self.steps += len(ctrl) * len(goal)
         cost = np.zeros(len(ctrl))
         for step in range(len(goal)):
@@ -154,29 +190,31 @@ class PredictiveSamplingTracker:
             cost += wrong.sum(axis=1) + 0.1 * short.sum(axis=1)
         return cost + 100.0 * self._batch.blow_ups
 
-    def _chances(self, frame: int, wrong: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(46,) how likely each actuator is varied, given the keys (H, 88) that go wrong.
+    def _probabilities(self, frame: int, wrong: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(46,) probability that each actuator is varied, given the keys (H, 88) that go wrong.
 
         Mostly those of the fingers that miss a key or are nearest to one that is hit.
         """
-        chance = np.zeros(46)
+        probability = np.zeros(LAYOUT.ctrl_size)
+        arm = LAYOUT.arm_actuators
         for step, key in np.argwhere(wrong):
-            players = np.argwhere(self._finger_key[frame + step] == key)
-            if not len(players):
+            fingers = np.argwhere(self.plan.finger_key[frame + step] == key)
+            if not len(fingers):
                 away = np.abs(self._along[frame + step] - key_centres()[key, 1])
-                players = np.argwhere(away == away.min())
-            for index, finger in players:
-                mine = chance[self._hands[index].actuators]
+                fingers = np.argwhere(away == away.min())
+            for index, finger in fingers:
+                mine = probability[LAYOUT.actuators[index]]
                 np.maximum(mine, self.config.others, out=mine)
-                mine[_ARM] = np.maximum(mine[_ARM], self.config.arm)
+                mine[arm] = np.maximum(mine[arm], self.config.arm)
                 mine[LAYOUT.finger_actuators[finger]] = self.config.blamed
-        return chance
+        return probability
 
-    def _variations(self, frames: int, chance: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _variations(self, frames: int, probability: NDArray[np.float64]) -> NDArray[np.float64]:
         """(B, frames, 46) smooth random additions to the controls."""
-        points = np.arange(0, frames + self.config.knots, self.config.knots)
-        drawn = self._rng.standard_normal((self.config.variations, len(points), 46)) * self._spread
-        drawn *= self._rng.random((self.config.variations, 1, 46)) < chance
+        knots = np.arange(0, frames + self.config.knots, self.config.knots)
+        size = self.config.variations, len(knots), LAYOUT.ctrl_size
+        drawn = self._rng.standard_normal(size) * self._spread
+        drawn *= self._rng.random((size[0], 1, size[2])) < probability
         at = np.arange(frames)
         low = at // self.config.knots
         share = ((at % self.config.knots) / self.config.knots)[:, None]

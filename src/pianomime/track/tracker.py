@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Protocol
 
 from pianomime.plan import FingertipPlan
-from pianomime.world import World
+from pianomime.track.controller import BatchController, Controller
 
 
 class Tracker(Protocol):
-    """Turns a FingertipPlan and the state of the World into controls, one frame at a time."""
+    """Makes controllers that follow fingertip plans.
 
-    def begin(self, plan: FingertipPlan) -> None:
-        """Prepare for a plan: everything that can be computed before the music starts."""
+    A tracker holds settings alone. Whatever belongs to one performance is in its controller, so
+    that one tracker may follow many plans at the same time.
+    """
 
-    def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """The control (46,) for `World.step` in this frame, from the state before it.
+    def start(self, plan: FingertipPlan) -> Controller:
+        """A controller for a plan, from the rest pose.
 
-        It depends on plan, frame and world alone: a tracker that looks ahead may ask for a frame
-        more than once, on copies of the world.
+        Everything that can be computed before the music starts is computed here. The plan is never
+        written into.
+
+        Args:
+            plan: what to follow.
         """
         ...
 
 
-@runtime_checkable
-class PedalTracker(Tracker, Protocol):
-    """A tracker that works the sustain pedal as well; for all others the score does."""
+class BatchTracker(Tracker, Protocol):
+    """A tracker whose controllers can control many worlds at once."""
 
-    def pedal(self, frame: int) -> bool:
-        """Whether the pedal is down in the frame whose control was asked for last."""
+    def start(self, plan: FingertipPlan) -> BatchController:
+        """As `Tracker.start`."""
         ...

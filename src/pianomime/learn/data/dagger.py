@@ -1,25 +1,28 @@
-"""Lessons: a demonstration is played, not always well, while a teacher says what it would do.
+"""DAgger: roll out a noisy policy, and label every visited state with the expert's action.
 
-What experts leave behind shows only how all goes well: who imitates it does not learn what to do
-when it does not. A teacher that can be asked at any moment, such as a tracker, is asked in the
-moments that the pupil gets into (Ross et al., "A reduction of imitation learning and structured
-prediction to no-regret online learning", 2011); noise on what is played brings on more of them.
+Trajectories of experts show only how everything goes well: a policy that imitates them does not
+learn to recover. Here the expert is a tracker, which can be asked for its action in any state, so
+it labels the states that the policy in training gets into (Ross, Gordon and Bagnell, "A reduction
+of imitation learning and structured prediction to no-regret online learning", 2011). Noise on the
+controls adds more such states (Laskey et al., "DART: noise injection for robust
+imitation learning", 2017).
 """
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections import deque
+import pickle
+import tempfile
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pianomime.errors import InputError
-from pianomime.learn.data.dagger_config import DaggerConfig, check_dagger
-from pianomime.learn.data.episode import Episode, empty_columns, fill_columns, write_state
+from pianomime.errors import InputError, WorkFailed
+from pianomime.learn.data.dagger_config import DaggerConfig
+from pianomime.learn.data.episode import Episode, fill_columns, record
 from pianomime.plan.demonstration import Demonstration
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.finger_assignment import flat_heights
@@ -27,99 +30,161 @@ from pianomime.policies.fingertip_policy import LearnedPlanner
 from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.policy import load_policy
 from pianomime.policies.sampler import Sampler
-from pianomime.track import DynamicTracker, IkTracker
+from pianomime.track import Controller, DynamicTracker, IkTracker
+from pianomime.workers import Answer, Row, cores, work
 from pianomime.world import World
 from pianomime.world.hand import by_actuator
+from pianomime.world.layout import LAYOUT
 
-_QUICK = Sampler(steps=2)
-"""How a pilot is asked: what it says need not be the best, and there are many frames."""
+_WORKER = "pianomime.learn.data.dagger:load_dagger_worker"
 
-_REACH = by_actuator(1.0, 0.3, 0.03)
-"""Noise [rad, m] of actuators that moves fingertips as 1 rad of a finger's does."""
+_FAST = Sampler(steps=2)
+"""Sampling of the policies that play: there are many frames, and rough actions will do."""
+
+_NOISE_SCALE = by_actuator(1.0, 0.3, 0.03)
+"""(46,) [rad, m] noise of each actuator that moves fingertips about as far as 1 rad of a finger."""
 
 
-def collect_dagger_episode(clip: Demonstration, number: int, config: DaggerConfig) -> Episode:
-    """Play a demonstration and write down the teacher's controls as `action`.
+def collect_dagger_episode(
+    demonstration: Demonstration, number: int, config: DaggerConfig
+) -> Episode:
+    """Play a demonstration and record the expert's controls as `action`.
 
-    Its fingertips are first made feasible for the robot's hands (`make_feasible`): these are what
-    high-level policies learn to output and low-level policies to reach. Fingertips of a high-level
-    policy are recorded as it outputs them, and made feasible for the expert alone.
+    The expert is the dynamic tracker. The demonstration's fingertips are first made feasible for
+    the robot's hands (`make_feasible`): these are what high levels learn to predict and low levels
+    to reach. Fingertips of a high-level policy are recorded as it predicts them, and made feasible
+    for the expert alone.
 
     Args:
-        clip: what to play.
-        number: of the clip, from which it is drawn, with the config's seed.
-        config: how.
+        demonstration: what to play.
+        number: of the demonstration, which seeds its randomness together with the config's seed.
+        config: which policies play, and the noise.
 
     Raises:
-        InputError: the pilot cannot be read.
+        InputError: a policy cannot be read.
     """
-    plan = clip.plan
-    teacher, prior = DynamicTracker(), IkTracker()
-    draw = np.random.default_rng([config.seed, number])
-    spread = config.noise * draw.random() * _REACH
-    seeds = draw.integers(2**31, size=2).tolist()
-    pilot = teacher if config.pilot is None else load_policy_tracker(config.pilot, _QUICK, seeds[0])
-    if config.planner is None:
-        taught = make_feasible(plan)
-        shown = replace(taught, fingertips=flat_heights(taught.fingertips, taught.finger_key))
+    rng = np.random.default_rng([config.seed, number])
+    spread = config.noise * rng.random() * _NOISE_SCALE
+    seeds = rng.integers(2**31, size=2).tolist()
+    score = demonstration.score
+    if config.fingertip_policy is None:
+        feasible = make_feasible(demonstration.plan)
+        plan = replace(feasible, fingertips=flat_heights(feasible.fingertips, feasible.finger_key))
     else:
-        planner = LearnedPlanner(load_policy(config.planner, _QUICK), seeds[1])
-        shown = planner.plan(clip.score)
-        taught = make_feasible(shown)
-    teacher.begin(taught)
-    prior.begin(shown)
-    if pilot is not teacher:
-        pilot.begin(shown)
-    added = np.zeros(46)
-    goal, pedal = clip.score.roll(), clip.score.pedal_roll()
-    columns = empty_columns(len(plan))
-    world = World(quiet=True)
-    for frame in range(len(plan)):
-        write_state(columns, frame, world)
-        columns["prior"][frame] = prior.control(frame, world)
-        columns["action"][frame] = said = teacher.control(frame, world)
-        played = said if pilot is teacher else pilot.control(frame, world)
-        fresh = np.sqrt(1.0 - config.smooth**2) * draw.standard_normal(46)
-        added = config.smooth * added + fresh
-        world.step(played + spread * added, bool(pedal[frame]))
-        columns["pressed"][frame] = world.pressed
-    f1 = fill_columns(columns, goal, shown.fingertips, shown.finger_key)
-    return Episode(clip.score.title, f1, "ik", columns, clip.song)
+        policy = load_policy(config.fingertip_policy, _FAST)
+        plan = LearnedPlanner(policy, seeds[1]).plan(score)
+        feasible = make_feasible(plan)
+    played = None
+    if config.rollout_policy is not None:
+        played = load_policy_tracker(config.rollout_policy, _FAST, seeds[0]).start(plan)
+    expert = DynamicTracker().start(feasible)
+    controller = _DaggerController(expert, played, spread, config.noise_correlation, rng)
+    columns = record(controller, IkTracker().start(plan), score)
+    columns["action"][:] = controller.labels
+    f1 = fill_columns(columns, score.roll(), plan.fingertips, plan.finger_key)
+    return Episode(score.title, f1, "ik", columns, demonstration.song)
+
+
+class _DaggerController:
+    """Plays a policy, or the expert, with noise, and keeps what the expert would do.
+
+    Attributes:
+        replayable: False, for every call draws noise.
+        plan: what the expert follows.
+        labels: (T, 46) the expert's control in the state before each frame [rad, m].
+
+    Args:
+        expert: the expert.
+        policy: plays instead of it, if given.
+        spread: (46,) standard deviation of the noise [rad, m].
+        correlation: of the noise from frame to frame: an autoregressive process of order 1.
+        rng: of the noise.
+    """
+
+    replayable = False
+
+    def __init__(
+        self,
+        expert: Controller,
+        policy: Controller | None,
+        spread: NDArray[np.float64],
+        correlation: float,
+        rng: np.random.Generator,
+    ) -> None:
+        self.plan = expert.plan
+        self.labels = np.empty((len(expert.plan), LAYOUT.ctrl_size))
+        self._expert, self._policy = expert, policy
+        self._spread, self._correlation, self._rng = spread, correlation, rng
+        self._noise = np.zeros(LAYOUT.ctrl_size)
+
+    def control(self, frame: int, world: World) -> NDArray[np.float64]:
+        """As `Controller.control`."""
+        action = self.labels[frame] = self._expert.control(frame, world)
+        played = action if self._policy is None else self._policy.control(frame, world)
+        fresh = self._rng.standard_normal(LAYOUT.ctrl_size)
+        self._noise = self._correlation * self._noise + np.sqrt(1.0 - self._correlation**2) * fresh
+        ctrl: NDArray[np.float64] = played + self._spread * self._noise
+        return ctrl
 
 
 def collect_dagger(
-    clips: Sequence[Demonstration], config: DaggerConfig, jobs: int | None = None
+    demonstrations: Sequence[Demonstration], config: DaggerConfig, jobs: int | None = None
 ) -> Iterator[Episode]:
-    """Lessons of many clips, in their order, several at a time.
+    """Episodes of many demonstrations, in their order, several at a time.
 
     Args:
-        clips: what to play.
-        config: how.
+        demonstrations: what to play.
+        config: which policies play, and the noise.
         jobs: processes; one a core if None.
 
     Raises:
-        InputError: the config, the pilot or the planner cannot be used.
+        InputError: a policy cannot be used.
+        WorkFailed: a demonstration cannot be played.
     """
-    check_dagger(config)
-    if config.planner is not None and load_policy(config.planner).about["level"] != "high":
-        raise InputError(f"{config.planner}: not a stage that says fingertips")
-    if config.pilot is not None:
-        load_policy_tracker(config.pilot)
-    jobs = jobs or os.cpu_count() or 1
-    if jobs == 1:
-        for number, clip in enumerate(clips):
-            yield collect_dagger_episode(clip, number, config)
-        return
-    # Not forked: MuJoCo and ONNX Runtime have threads.
-    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
-        waiting: deque[Future[Episode]] = deque()
-        try:
-            for number, clip in enumerate(clips):
-                waiting.append(pool.submit(collect_dagger_episode, clip, number, config))
-                # Episodes are large: few are kept that nobody has taken.
-                if len(waiting) > 2 * jobs:
-                    yield waiting.popleft().result()
-            while waiting:
-                yield waiting.popleft().result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    fingertips = config.fingertip_policy
+    if fingertips is not None and load_policy(fingertips).info.level != "high":
+        raise InputError(f"{fingertips}: not a policy that outputs fingertips")
+    if config.rollout_policy is not None:
+        load_policy_tracker(config.rollout_policy)
+    # Episodes are large, and pass through files. Nobody else can write into this folder.
+    with tempfile.TemporaryDirectory(prefix="pianomime-") as folder:
+
+        def request(number: int) -> dict[str, str]:
+            names = {name: str(Path(folder, f"{number}.{name}")) for name in ("task", "episode")}
+            task = demonstrations[number], number, config
+            Path(names["task"]).write_bytes(pickle.dumps(task))
+            return names
+
+        done: set[int] = set()
+        turn = 0
+        numbers = range(len(demonstrations))
+        with closing(work(_WORKER, numbers, jobs or cores(), request=request)) as recorded:
+            for number, row in recorded:
+                if "error" in row:
+                    title = demonstrations[number].score.title
+                    raise WorkFailed(f"{title}: cannot be recorded: {row['error']}")
+                done.add(number)
+                while turn in done:
+                    path = Path(folder, f"{turn}.episode")
+                    episode: Episode = pickle.loads(path.read_bytes())
+                    path.unlink()
+                    turn += 1
+                    yield episode
+
+
+def load_dagger_worker(setup: None) -> Answer:
+    """What `collect_dagger` has its worker processes do, which needs no setup.
+
+    Returns:
+        What reads the arguments of `collect_dagger_episode` from the file `task` of a request,
+        removes it, and writes the episode to the file `episode`.
+    """
+
+    def record_episode(request: dict[str, str]) -> Row:
+        task = Path(request["task"])
+        episode = collect_dagger_episode(*pickle.loads(task.read_bytes()))
+        task.unlink()
+        Path(request["episode"]).write_bytes(pickle.dumps(episode))
+        return {}
+
+    return record_episode

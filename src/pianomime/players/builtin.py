@@ -1,0 +1,124 @@
+"""The players that come with the program."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pianomime.errors import InputError
+from pianomime.plan import ZeroShotConfig, ZeroShotPlanner
+from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
+from pianomime.players.generalist import GeneralistPlayer
+from pianomime.players.player import PlannedPlayer, Player
+from pianomime.players.settings import PlayerFactory, configure
+from pianomime.policies.methods import (
+    FINGERS,
+    GENERALISTS,
+    SAMPLERS,
+    load_finger_tracker,
+    load_policy_tracker,
+    policy_path,
+)
+from pianomime.policies.policy import load_policy
+from pianomime.policies.sampler import Sampler
+from pianomime.track import (
+    DynamicConfig,
+    DynamicTracker,
+    IkConfig,
+    IkTracker,
+    PredictiveSamplingConfig,
+    PredictiveSamplingTracker,
+    Tracker,
+)
+
+
+def _searching(tracker: Tracker, effort: int, sampling: PredictiveSamplingConfig) -> Tracker:
+    return PredictiveSamplingTracker(tracker, sampling) if effort else tracker
+
+
+def _budget(effort: int, seed: int) -> PredictiveSamplingConfig:
+    return replace(PredictiveSamplingConfig.of_effort(effort or 1), seed=seed)
+
+
+def _zero_shot(effort: int, seed: int, **settings: Any) -> Player:
+    planner, tracker, sampling = configure(
+        settings,
+        planner=ZeroShotConfig(),
+        tracker=DynamicConfig(),
+        sampling=_budget(effort, seed),
+    )
+    controls = _searching(DynamicTracker(tracker), effort, sampling)
+    return PlannedPlayer("zero-shot", ZeroShotPlanner(planner), controls, effort)
+
+
+def _zero_shot_ik(effort: int, seed: int, **settings: Any) -> Player:
+    planner, tracker = configure(settings, planner=ZeroShotConfig(), tracker=IkConfig())
+    return PlannedPlayer("zero-shot-ik", ZeroShotPlanner(planner), IkTracker(tracker))
+
+
+def _fingers(effort: int, seed: int, weights: Path | None = None, **settings: Any) -> Player:
+    planner, sampling = configure(
+        settings, planner=ZeroShotConfig(), sampling=_budget(effort, seed)
+    )
+    controls = _searching(load_finger_tracker(weights), effort, sampling)
+    return PlannedPlayer(FINGERS, ZeroShotPlanner(planner), controls, effort)
+
+
+def _demonstration(
+    effort: int, seed: int, demonstration: Demonstration | str | Path = "", **settings: Any
+) -> Player:
+    tracker, sampling = configure(settings, tracker=DynamicConfig(), sampling=_budget(effort, seed))
+    planner = _demonstration_planner(demonstration)
+    controls = _searching(DynamicTracker(tracker), effort, sampling)
+    return PlannedPlayer("demonstration", planner, controls, effort)
+
+
+def _demonstration_ik(
+    effort: int, seed: int, demonstration: Demonstration | str | Path = "", **settings: Any
+) -> Player:
+    (tracker,) = configure(settings, tracker=IkConfig())
+    return PlannedPlayer(
+        "demonstration-ik", _demonstration_planner(demonstration), IkTracker(tracker)
+    )
+
+
+def _demonstration_planner(demonstration: Demonstration | str | Path) -> DemonstrationPlanner:
+    if not demonstration:
+        raise InputError("this player plays demonstrations (.npz), not MIDI files")
+    if not isinstance(demonstration, Demonstration):
+        demonstration = Demonstration.load(demonstration)
+    return DemonstrationPlanner(demonstration)
+
+
+def _generalist(method: str) -> PlayerFactory:
+    def make(effort: int, seed: int, weights: Path | None = None, **settings: Any) -> Player:
+        (sampler,) = configure(settings, sampler=SAMPLERS[effort])
+        *high, low = GENERALISTS[method]
+        tracker = load_policy_tracker(policy_path(low, weights), sampler, seed, low)
+        fingertips = load_policy(policy_path(high[0], weights), sampler, high[0]) if high else None
+        return GeneralistPlayer(method, tracker, fingertips, seed, effort)
+
+    return make
+
+
+FACTORIES: dict[str, PlayerFactory] = {
+    "zero-shot": _zero_shot,
+    "zero-shot-ik": _zero_shot_ik,
+    FINGERS: _fingers,
+    **{method: _generalist(method) for method in GENERALISTS},
+    "demonstration": _demonstration,
+    "demonstration-ik": _demonstration_ik,
+}
+"""What makes each player, by name."""
+
+_SEARCH = {"sampling": PredictiveSamplingConfig()}
+SETTINGS: dict[str, dict[str, Any]] = {
+    "zero-shot": {"planner": ZeroShotConfig(), "tracker": DynamicConfig(), **_SEARCH},
+    "zero-shot-ik": {"planner": ZeroShotConfig(), "tracker": IkConfig()},
+    FINGERS: {"planner": ZeroShotConfig(), **_SEARCH},
+    **{method: {"sampler": Sampler()} for method in GENERALISTS},
+    "demonstration": {"tracker": DynamicConfig(), **_SEARCH},
+    "demonstration-ik": {"tracker": IkConfig()},
+}
+"""The configs whose fields are the settings of each player, by group."""

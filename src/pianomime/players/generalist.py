@@ -1,0 +1,37 @@
+"""The player of one or two learned policies that plan while they play."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pianomime.music import Score
+from pianomime.players.player import Player
+from pianomime.policies.generalist import OneStageController, TwoStageController
+from pianomime.policies.policy import Policy
+from pianomime.policies.policy_tracker import PolicyTracker
+from pianomime.track import Controller
+
+
+@dataclass(frozen=True)
+class GeneralistPlayer(Player):
+    """Plays any score with learned policies, closed loop.
+
+    Attributes:
+        name: what reports call it.
+        low: the tracker of the low-level policy, or of one that goes from goals to controls.
+        high: the fingertip policy; None for a policy of one stage.
+        seed: of the fingertip policy's sampling.
+        effort: how many steps a diffusion is sampled in, 0 to 3.
+    """
+
+    name: str
+    low: PolicyTracker
+    high: Policy | None = None
+    seed: int = 0
+    effort: int = 0
+
+    def start(self, score: Score) -> Controller:
+        """Load nothing, plan nothing: everything happens frame by frame."""
+        if self.high is None:
+            return OneStageController(score, self.low)
+        return TwoStageController(score, self.high, self.low, self.seed)

@@ -1,0 +1,211 @@
+"""Players by name: those that come with the program, and those that others bring."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import sys
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from pianomime.errors import InputError, unknown_name
+from pianomime.players.builtin import FACTORIES, SETTINGS
+from pianomime.players.player import Player
+from pianomime.players.settings import PlayerFactory, settings_of
+from pianomime.policies.methods import METHODS, weight_files
+
+EFFORT = 1
+"""How hard players try unless told otherwise, 0 to 3."""
+
+GROUP = "pianomime.players"
+"""The entry point group in which a package announces players: NAME = "module:factory"."""
+
+
+RUN_FILE = "run.json"
+"""The file that marks the folder of an expert's run."""
+EXPERT = "expert"
+"""The player of an expert, which is loaded by its folder."""
+
+_factories = dict(FACTORIES)
+
+
+def register_player(name: str, factory: PlayerFactory) -> None:
+    """Make a player known to `load_player`, in this process.
+
+    Worker processes do not see it: `evaluate` and the command line find players by entry points
+    (group `pianomime.players`) or as "package.module:factory".
+
+    Args:
+        name: what it is called; an earlier player of that name is replaced.
+        factory: makes it; called with `effort` (0 to 3), `seed` and the settings, all by name.
+
+    Raises:
+        InputError: the name is empty, or would be taken for a path or a factory.
+    """
+    if not name or any(sign in name for sign in ":/\\ ") or name.endswith(".npz"):
+        raise InputError(f"a player cannot be called {name!r}")
+    _factories[name] = factory
+
+
+def player_names() -> list[str]:
+    """The names that `load_player` knows, those of entry points included."""
+    return [*_factories, *(name for name in _entry_points() if name not in _factories)]
+
+
+def load_player(
+    source: str | Path | Player, effort: int = EFFORT, seed: int = 0, **settings: Any
+) -> Player:
+    """Load a player.
+
+    Args:
+        source: one of
+            a name, such as "zero-shot" (see `player_names`);
+            "package.module:factory", which is called as `factory(effort, seed, **settings)`;
+            the folder of a run (`pianomime train-expert`), whose expert plays its song;
+            a folder of weights (`pianomime train`), followed by "/METHOD" if it holds several;
+            a demonstration (.npz, `pianomime retarget`), which plays its song with the human's
+            fingertips;
+            or a player, which is returned as it is.
+        effort: how hard it tries. 0 plays in one pass; 1 to 3 try variations of what would go
+            wrong before it is played, ever more of them. Generalists sample their diffusion in
+            ever more steps.
+        seed: of everything that is random.
+        **settings: of planner, tracker and search, such as `planner={"beam": 200}` or
+            `**{"planner.beam": 200}` (see `player_settings`).
+
+    Raises:
+        InputError: there is no such player, effort or setting, or its files cannot be used.
+    """
+    if isinstance(source, Player):
+        if settings:
+            raise InputError(f"{source.name}: a player that is made already takes no settings")
+        return source
+    if effort not in range(4):
+        raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
+    if seed < 0:
+        raise InputError(f"seed must be 0 or more, not {seed}")
+    factory, _ = _find(source)
+    return _call(factory, str(source), {"effort": effort, "seed": seed, **settings})
+
+
+def player_files(source: str | Path) -> list[Path]:
+    """The files that decide how a player plays: weights, a run, a demonstration, a module.
+
+    Raises:
+        InputError: there is no such player, or one of its files is not there.
+    """
+    return _find(source)[1]
+
+
+def player_settings(name: str) -> dict[str, Any]:
+    """The settings that a player takes, with the values that they have unless told otherwise.
+
+    Args:
+        name: one of `player_names`; players of other packages do not tell their settings.
+
+    Raises:
+        InputError: there is no such player.
+    """
+    if name not in player_names():
+        raise unknown_name("player", name, player_names())
+    return settings_of(**SETTINGS.get(name, {}))
+
+
+def _find(source: str | Path) -> tuple[PlayerFactory, list[Path]]:
+    """What makes a player, and the files that decide how it plays."""
+    name = str(source)
+    if name in _factories:
+        factory = _factories[name]
+        return factory, weight_files(name) if name in METHODS else _source_file(factory)
+    if name in _entry_points():
+        return _imported(_entry_points()[name])
+    path = Path(name)
+    if path.suffix == ".npz":
+        if not path.is_file():
+            raise InputError(f"{name}: no such demonstration")
+        return _of_demonstration(path), [path]
+    if path.is_dir():
+        return _of_folder(path)
+    if path.name in METHODS and any(path.parent.glob("*.onnx")):
+        return _of_weights(path.name, path.parent)
+    if ":" in name:
+        return _imported(name)
+    raise unknown_name("player", name, player_names())
+
+
+def _call(factory: PlayerFactory, name: str, arguments: dict[str, Any]) -> Player:
+    try:
+        inspect.signature(factory).bind(**arguments)
+    except TypeError as error:
+        raise InputError(f"{name}: {error}") from error
+    player = factory(**arguments)
+    if not isinstance(player, Player):
+        raise InputError(f"{name}: makes a {type(player).__name__}, which is no pianomime.Player")
+    return player
+
+
+@cache
+def _entry_points() -> dict[str, str]:
+    return {point.name: point.value for point in entry_points(group=GROUP)}
+
+
+def _imported(place: str) -> tuple[PlayerFactory, list[Path]]:
+    """The factory at "package.module:factory", and the file that it is in."""
+    module, _, name = place.partition(":")
+    # A file in the present folder will do, also for the command line. It comes last, so that
+    # nothing in that folder hides a library.
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    try:
+        factory: Any = importlib.import_module(module)
+        for part in name.split("."):
+            factory = getattr(factory, part)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InputError(f"{place}: {error}") from error
+    if not callable(factory):
+        raise InputError(f"{place}: cannot be called to make a player")
+    return factory, _source_file(factory)
+
+
+def _source_file(factory: PlayerFactory) -> list[Path]:
+    try:
+        file = inspect.getsourcefile(factory)
+    except TypeError:
+        file = None
+    return [] if file is None else [Path(file)]
+
+
+def _of_demonstration(path: Path) -> PlayerFactory:
+    def make(effort: int, seed: int, **settings: Any) -> Player:
+        return FACTORIES["demonstration"](effort=effort, seed=seed, demonstration=path, **settings)
+
+    return make
+
+
+def _of_folder(path: Path) -> tuple[PlayerFactory, list[Path]]:
+    if (path / RUN_FILE).is_file():
+        # What plays experts stands above this room, and announces itself as others do.
+        expert, source = _imported(_entry_points()[EXPERT])
+
+        def make(effort: int, seed: int) -> Player:
+            return expert(effort=effort, seed=seed, run=path)
+
+        return make, [*source, *sorted(file for file in path.iterdir() if file.is_file())]
+    there = {file.stem for file in path.glob("*.onnx")}
+    whole = [method for method, policies in METHODS.items() if there.issuperset(policies)]
+    if not whole:
+        raise InputError(f"{path}: neither the folder of a run nor one of weights")
+    if len(whole) > 1:
+        known = ", ".join(f"{path / method}" for method in whole)
+        raise InputError(f"{path}: holds weights of several players; name one: {known}")
+    return _of_weights(whole[0], path)
+
+
+def _of_weights(method: str, weights: Path) -> tuple[PlayerFactory, list[Path]]:
+    def make(effort: int, seed: int, **settings: Any) -> Player:
+        return _factories[method](effort=effort, seed=seed, weights=weights, **settings)
+
+    return make, weight_files(method, weights)

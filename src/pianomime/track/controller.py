@@ -1,0 +1,73 @@
+"""Controllers: what meets the World. All state of a performance that is being played is in one."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.plan import FingertipPlan
+from pianomime.world import World
+
+
+class Controller(Protocol):
+    """Gives the controls of one performance, frame after frame."""
+
+    @property
+    def replayable(self) -> bool:
+        """Whether the control depends on plan, frame and world alone.
+
+        Such a controller may be asked for any frame, more than once, on copies of the world. One
+        that is not replayable keeps a memory: it must be asked for every frame once, in order.
+        """
+        ...
+
+    @property
+    def plan(self) -> FingertipPlan:
+        """What is to be played, a row for each frame.
+
+        A controller that plans while it plays knows the frames that it was asked for; the rest are
+        at rest.
+        """
+        ...
+
+    def control(self, frame: int, world: World) -> NDArray[np.float64]:
+        """The control for `World.step` in one frame.
+
+        Args:
+            frame: 0 for the first.
+            world: as it is before the frame; it must not be changed.
+
+        Returns:
+            (46,) targets of the position actuators, right then left hand [rad, m].
+        """
+        ...
+
+
+@runtime_checkable
+class PedalController(Controller, Protocol):
+    """A controller that works the sustain pedal as well; for all others the score does."""
+
+    def pedal(self, frame: int) -> bool:
+        """Whether the pedal is down in the frame whose control was asked for last."""
+        ...
+
+
+class BatchController(Controller, Protocol):
+    """A replayable controller of many worlds at once, each at its own frame of one plan."""
+
+    def controls(
+        self, frames: NDArray[np.int64], qpos: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The controls of n worlds, each bit for bit what `control` gives for it.
+
+        Args:
+            frames: (n,) of the plan.
+            qpos: (n, 142) positions before them, as in `World.qpos` [rad, m].
+
+        Returns:
+            The controls (n, 46) [rad, m], and the points of the hands (n, 2, 6, 3) [m] at these
+            positions: hands (left, right), wrist and fingertips, thumb first.
+        """
+        ...

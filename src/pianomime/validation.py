@@ -1,0 +1,63 @@
+"""Checks of settings, for the `__post_init__` of configs."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from pianomime.errors import InputError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def within(name: str, value: float, least: float, most: float = math.inf) -> None:
+    """Refuse a number out of range, infinity and NaN among them.
+
+    Raises:
+        InputError: it is; the message names it as the command line does.
+    """
+    if not (least <= value <= most and math.isfinite(value)):
+        wanted = f"{least:g} or more" if most == math.inf else f"{least:g} to {most:g}"
+        raise InputError(f"{name.replace('_', '-')} must be {wanted}, not {value:g}")
+
+
+def above_zero(name: str, value: float) -> None:
+    """Refuse a number that is not more than 0, infinity and NaN among them.
+
+    Raises:
+        InputError: it is not; the message names it as the command line does.
+    """
+    if not 0 < value < math.inf:
+        raise InputError(f"{name.replace('_', '-')} must be more than 0, not {value:g}")
+
+
+def finite(config: DataclassInstance) -> None:
+    """Refuse a config that holds a number that is negative, infinite or NaN.
+
+    Raises:
+        InputError: it does; the message names the first one as the command line does.
+    """
+    for field in dataclasses.fields(config):
+        value = getattr(config, field.name)
+        if isinstance(value, int | float):
+            within(field.name, value, 0)
+
+
+def one_of(name: str, value: str, choices: Sequence[str]) -> None:
+    """Refuse a word that is not among the choices.
+
+    Args:
+        name: of the setting, such as "env.base".
+        value: that was given.
+        choices: all there are.
+
+    Raises:
+        InputError: it is another one; the message names it as the command line does.
+    """
+    if value not in choices:
+        raise InputError(
+            f"{name.replace('_', '-')} must be one of {', '.join(choices)}, not {value!r}"
+        )

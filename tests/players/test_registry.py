@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+import importlib.metadata
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pianomime
+from pianomime import InputError, PlannedPlayer, Score, evaluate, excerpt, load_player, songs
+from pianomime.players import player_names, register_player, registry
+from pianomime.players.registry import player_files, player_settings
+from pianomime.policies.methods import weights_folder
+
+PLUGIN = """
+import pianomime
+
+def make_player(effort, seed, speed=1.0):
+    base = pianomime.load_player("zero-shot", effort=0)
+    return pianomime.PlannedPlayer(f"mine {speed:g}", base.planner, base.tracker)
+
+def make_nothing(effort, seed):
+    return "a player"
+"""
+
+
+@pytest.fixture
+def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A module of somebody else's in the folder where they work."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, "their_player", raising=False)
+    Path("their_player.py").write_text(PLUGIN)
+    return tmp_path / "their_player.py"
+
+
+def test_a_name_that_nobody_has_gets_the_closest_ones() -> None:
+    with pytest.raises(InputError, match=r"no player 'zeroshot'; did you mean 'zero-shot'"):
+        load_player("zeroshot")
+
+
+def test_a_registered_player_is_found_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_factories", dict(registry._factories))
+
+    def factory(effort: int, seed: int, tempo: float = 1.0) -> PlannedPlayer:
+        base = load_player("zero-shot", effort=0)
+        assert isinstance(base, PlannedPlayer)
+        return PlannedPlayer(f"mine {effort} {seed} {tempo}", base.planner, base.tracker, effort)
+
+    register_player("mine", factory)
+    assert "mine" in player_names()
+    assert load_player("mine", 2, 3, tempo=0.5).name == "mine 2 3 0.5"
+    with pytest.raises(InputError, match=r"mine: .*tempi"):
+        load_player("mine", tempi=0.5)
+
+
+@pytest.mark.parametrize("name", ["", "a:b", "a/b", "my player", "x.npz"])
+def test_names_that_could_not_be_asked_for_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match="cannot be called"):
+        register_player(name, lambda effort, seed: load_player("zero-shot"))
+
+
+def test_a_factory_is_named_by_its_module(plugin: Path) -> None:
+    player = load_player("their_player:make_player", effort=0, speed=2.0)
+    assert player.name == "mine 2"
+    assert player_files("their_player:make_player") == [plugin]
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("no_such_module:make", "no_such_module"),
+        ("their_player:no_such_factory", "no_such_factory"),
+        ("their_player:PLUGIN.x:y", "their_player"),
+        ("their_player:make_nothing", "no pianomime.Player"),
+    ],
+)
+def test_what_is_no_factory_is_one_line(plugin: Path, source: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        load_player(source)
+    assert "\n" not in str(error.value)
+
+
+def test_a_player_of_somebody_else_is_evaluated_without_a_fork(plugin: Path) -> None:
+    results = evaluate(
+        ["twinkle-twinkle"], "their_player:make_player", effort=0, seconds=2, jobs=1, out="out"
+    )
+    (row,) = results["songs"]
+    assert row["player"] == "mine 1"
+    assert row["f1"] > 0.9
+
+
+def test_an_instance_is_evaluated_in_this_process() -> None:
+    base = load_player("zero-shot", effort=0)
+    assert isinstance(base, PlannedPlayer)
+    mine = PlannedPlayer("mine", base.planner, base.tracker)
+    results = evaluate(["twinkle-twinkle", "missing.mid"][:1], mine, seconds=2)
+    assert results["player"] == "mine"
+    assert results["songs"][0]["f1"] > 0.9
+    with pytest.raises(InputError, match="takes no settings"):
+        load_player(mine, planner={"beam": 3})
+
+
+def test_entry_points_bring_players(monkeypatch: pytest.MonkeyPatch, plugin: Path) -> None:
+    point = importlib.metadata.EntryPoint("theirs", "their_player:make_player", registry.GROUP)
+    monkeypatch.setattr(registry, "entry_points", lambda group: [point])
+    registry._entry_points.cache_clear()
+    try:
+        assert "theirs" in player_names()
+        assert load_player("theirs", effort=0).name == "mine 1"
+    finally:
+        registry._entry_points.cache_clear()
+
+
+def test_a_folder_of_weights_is_a_player(tmp_path: Path) -> None:
+    for name in ("high-diff", "low-mse"):
+        shutil.copy(weights_folder() / f"{name}.onnx", tmp_path)
+    assert load_player(tmp_path, 0).name == "two-stage-mse"
+    shutil.copy(weights_folder() / "low-diff.onnx", tmp_path)
+    with pytest.raises(InputError, match="holds weights of several players; name one"):
+        load_player(tmp_path)
+    assert load_player(tmp_path / "two-stage-diff", 0).name == "two-stage-diff"
+    assert {file.parent for file in player_files(tmp_path / "two-stage-diff")} == {tmp_path}
+
+
+def test_a_folder_of_something_else_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="neither the folder of a run nor one of weights"):
+        load_player(tmp_path)
+
+
+@pytest.mark.parametrize(("effort", "seed"), [(4, 0), (-1, 0), (0, -1)])
+def test_efforts_and_seeds_out_of_range(effort: int, seed: int) -> None:
+    with pytest.raises(InputError, match="must be"):
+        load_player("zero-shot", effort, seed)
+
+
+def test_settings_reach_planner_tracker_and_search() -> None:
+    player = load_player(
+        "zero-shot", 1, planner={"beam": "7"}, **{"tracker.force": 6, "sampling.rounds": 1}
+    )
+    assert isinstance(player, PlannedPlayer)
+    assert player.planner.config.fingering.beam == 7
+    assert player.tracker._tracker.config.force == 6.0
+    assert player.tracker.config.rounds == 1
+
+
+def test_a_setting_changes_what_is_played() -> None:
+    score = excerpt(Score.from_midi(songs.path("bach-prelude-c")), seconds=3)
+    usual = load_player("zero-shot", 0).play(score)
+    weak = load_player("zero-shot", 0, tracker={"force": 0.5}).play(score)
+    assert not np.array_equal(usual.ctrl, weak.ctrl)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"planner.beem": 3}, "did you mean 'planner.beam'"),
+        ({"painter.beam": 3}, "no setting 'painter.beam'"),
+        ({"planner.beam": "many"}, "planner.fingering.beam must be of the kind int"),
+        ({"planner.beam": 0}, "beam must be 1"),
+        ({"tracker.force": float("nan")}, "force must be 0 or more"),
+        ({"sampling.rounds": 0}, "rounds must be 1"),
+        ({"speed": 3}, "no setting 'speed'"),
+    ],
+)
+def test_settings_that_make_no_sense_are_one_line(settings: dict, message: str) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        load_player("zero-shot", **settings)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", [n for n in player_names() if player_settings(n)])
+def test_every_setting_that_is_listed_exists(name: str) -> None:
+    from pianomime.players.builtin import SETTINGS
+    from pianomime.players.settings import configure
+
+    configs = SETTINGS[name]
+    assert configure(player_settings(name), **configs) == tuple(configs.values())
+
+
+def test_every_public_name_is_there_and_is_listed() -> None:
+    for name in pianomime.__all__:
+        assert getattr(pianomime, name) is not None
+    assert set(dir(pianomime)) == set(pianomime.__all__)
+    with pytest.raises(AttributeError):
+        pianomime.no_such_name  # noqa: B018
