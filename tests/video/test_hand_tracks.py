@@ -6,7 +6,8 @@ import pytest
 import made_up_video as made_up
 from pianomime.plan import LEFT, RIGHT
 from pianomime.video.hands.sightings import Sighting
-from pianomime.video.hands.tracks import follow, poorly_seen
+from pianomime.video.hands.tracks import follow
+from pianomime.video.remarks import poorly_seen
 
 SIZE = (1280, 720)
 

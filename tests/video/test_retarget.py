@@ -16,6 +16,7 @@ from pianomime.plan.demonstration import Demonstration
 from pianomime.video import retarget as room
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
+from pianomime.video.remarks import on_keyboard
 from pianomime.video.retarget import RetargetConfig, retarget
 
 SIZE = (640, 360)
@@ -147,7 +148,7 @@ def test_a_keyboard_whose_far_end_is_cut_off(video):
     light = np.full((40, 3, 88, 3), 90, np.uint8)
     light[:, 1] = 0
     with LightRecord.of(light) as record:
-        assert room._hidden(record) == []
+        assert on_keyboard(record) == []
 
 
 def test_another_song_is_noticed(video, hands, tmp_path, score):

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import tyro
 
+from pianomime.keyboard import EXCERPT_SECONDS
+
 
 @dataclass(frozen=True)
 class Evaluate:
@@ -35,7 +37,7 @@ class Evaluate:
     generalists it is 2, 5, 20 or 100 steps of the diffusion."""
     settings: tyro.conf.Suppress[dict[str, str]] = field(default_factory=dict)
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
-    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """How much of each song to play at most, from its first note [s]."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Songs played at the same time; one a core if not given. They slow each other down: compare

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from pianomime.keyboard import EXCERPT_SECONDS
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -51,7 +53,7 @@ class Play:
     """Seed of everything that is random."""
     settings: tyro.conf.Suppress[dict[str, str]] = field(default_factory=dict)
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
-    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """How much to play at most, from what sounds at START or first after it [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in the song to begin [s]."""

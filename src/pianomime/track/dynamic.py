@@ -31,6 +31,11 @@ from pianomime.world.parameters import key_centres
 _LIFT_DAMPING = 0.01
 """[m/rad] Damping of the lift: joints that raise a fingertip by less hardly move."""
 
+# Errors of the path at which their cost is 1 [m].
+_WRIST_TOLERANCE = 0.05  # along the keyboard; the others do not count
+_HOVER_TOLERANCE = 0.004
+_PRESS_TOLERANCE = np.array([0.004, 0.0015, 0.001])  # along x, y, z
+
 
 @dataclass(frozen=True)
 class DynamicConfig:
@@ -186,12 +191,12 @@ class DynamicController:
         self, points: NDArray[np.float64], finger_key: NDArray[np.int8]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         targets = points.copy()
-        weights = np.empty_like(points)
-        weights[:, 0] = [0.0, 1 / 0.05, 0.0]
-        weights[:, 1:] = 1 / 0.004
+        weights = np.zeros_like(points)
+        weights[:, 0, 1] = 1 / _WRIST_TOLERANCE
+        weights[:, 1:] = 1 / _HOVER_TOLERANCE
         pressing = finger_key >= 0
         targets[:, 1:, 2][pressing] = KEY_REST[finger_key[pressing]] - self.config.depth
-        weights[:, 1:][pressing] = 1 / np.array([0.004, 0.0015, 0.001])
+        weights[:, 1:][pressing] = 1 / _PRESS_TOLERANCE
         return targets, weights
 
 

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from pianomime.keyboard import BLACK, NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
-from pianomime.video.keyboard.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
+from pianomime.plan.fingertip_plan import HOVER_HEIGHT
+from pianomime.video.keyboard.geometry import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
 from pianomime.video.notes.fingers import NoteFingers
 from pianomime.world.parameters import key_centres, key_half_sizes
 
 Rule = Literal["steady", "paper"]
 """How fingertips are put on their keys."""
-
-HIGH = 0.045
-"""[m] z of points that press nothing: twice the height of a key (paper, appendix A, step 4)."""
 
 _LEAD = 8
 """Frames over which a finger comes over to where it presses, and goes back."""
@@ -29,11 +27,11 @@ _BLACK_X = (-0.055, 0.008)
 
 
 def raised(points: NDArray[np.floating], frames: int) -> NDArray[np.float64]:
-    """(frames, 2, 6, 3) points (T, 2, 6, 2) that press nothing: at `HIGH`.
+    """(frames, 2, 6, 3) points (T, 2, 6, 2) that press nothing: at `HOVER_HEIGHT`.
 
     Where there are too few the last ones are held, and where there are too many they are left out.
     """
-    high = np.full((frames, *points.shape[1:3], 3), HIGH)
+    high = np.full((frames, *points.shape[1:3], 3), HOVER_HEIGHT)
     high[: len(points), ..., :2] = points[:frames]
     high[len(points) :, ..., :2] = points[-1]
     return high

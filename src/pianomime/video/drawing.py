@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw
 
 from pianomime.keyboard import BLACK, KEYS, NO_KEY
 from pianomime.plan import LEFT
-from pianomime.video.keyboard.keyboard import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
+from pianomime.video.keyboard.geometry import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
 from pianomime.video.keyboard.plane import Plane
 from pianomime.world.parameters import key_centres, key_half_sizes
 

@@ -12,65 +12,67 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.keyboard import FRAME_RATE, key_name
+from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
 from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import LEFT, RIGHT
 from pianomime.plan.demonstration import Demonstration, on_grid
 from pianomime.progress import Progress, no_progress
+from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.detector import HandDetector
 from pianomime.video.hands.model import find_hand_model
 from pianomime.video.hands.sightings import Sightings
-from pianomime.video.hands.tracks import HandTracks, follow, poorly_seen
-from pianomime.video.keyboard.keyboard import find_keyboards
+from pianomime.video.hands.tracks import HandTracks, follow
+from pianomime.video.keyboard.keyboard import Keyboard, find_keyboards
 from pianomime.video.keyboard.plane import Plane
-from pianomime.video.keyboard.points import read_points
+from pianomime.video.keyboard.points import NamedPoints, read_points
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.offset import Offset, estimate_offset
 from pianomime.video.notes.reading import read_notes
 from pianomime.video.parallax import take_back_parallax
-from pianomime.video.stretches import stretches
 
 _BACKGROUND_FRAMES = 25
 _MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
-"""That a score can be as long as; files need not say how long they are."""
+"""Frames of the longest score; a video may be longer than its header says."""
 _TOO_FEW_TOUCHED = 0.5
 """Share of a MIDI file's notes with a finger on their key below which it is of another song."""
 _FEW_TOUCHED = 0.7
-"""Share of notes with a finger on their key below which notes read off a video are doubtful."""
+"""Share of notes with a finger on their key below which notes read from a video are doubtful."""
+_BETTER = 0.02
+"""Share of notes by which a less likely octave must have more fingers on keys to be chosen."""
 
 
 @dataclass(frozen=True)
 class RetargetConfig:
-    """How to make a demonstration of a video."""
+    """What is known about a video, and how to make a demonstration of it."""
 
     midi: Path | None = None
-    """What is played; read off the video if not given."""
+    """MIDI file of what is played; by default the notes are read from the video."""
     points: Path | None = None
-    """JSON of named points of the keyboard; found by itself if not given."""
+    """JSON file of named points of the keyboard; by default the keyboard is found automatically."""
     offset: float | None = None
-    """When in the video the MIDI file begins [s]; estimated if not given."""
+    """Time in the video at which the MIDI file begins [s]; by default it is estimated."""
     hand_model: Path | None = None
-    """MediaPipe's hand_landmarker.task; downloaded once if not given."""
+    """MediaPipe's hand_landmarker.task; by default it is downloaded once."""
     align: Rule = "steady"
-    """How fingertips are put on keys."""
+    """How fingertips are moved onto the keys they press, see `align`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Retargeted:
-    """A demonstration, and what a picture of how it was made needs.
+    """A demonstration, and what pictures of its making need.
 
     Attributes:
         demonstration: the result.
         film: the video.
-        plane: from its pixels to the world.
-        tracks: the hands, as they were seen and repaired.
-        fingers: who played each note.
-        remarks: what a person should know, one line each.
+        plane: plane of the keyboard in its pictures.
+        tracks: the tracked hands.
+        fingers: the finger that plays each note.
+        remarks: what a user should know, one line each.
     """
 
     demonstration: Demonstration
@@ -87,104 +89,136 @@ def retarget(
     """Make a demonstration of a video.
 
     Args:
-        video: any video of a keyboard from above.
+        video: a video of a keyboard from above.
         config: what else is known.
-        progress: told the phase, and the frames done and in all.
+        progress: called in the phases "keyboard", "hands" and "notes".
 
     Raises:
-        InputError: a file is not what it should be, or the video shows no keyboard, or no hands.
+        InputError: a file cannot be used, or the video shows no keyboard or no hands.
     """
     config = config or RetargetConfig()
-    # What can be wrong is looked at before what takes long.
-    if config.offset is not None and not abs(config.offset) <= MAX_SECONDS:
-        raise InputError(f"--offset must be a time in the video, not {config.offset:g} s")
-    named = None if config.points is None else read_points(config.points)
-    score = None if config.midi is None else Score.from_midi(config.midi)
-    film = Film(video)
-    if film.seconds > MAX_SECONDS:
-        raise InputError(f"{video}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
-    model = find_hand_model(config.hand_model)
-    remarks: list[str] = []
+    given = _Given.read(video, config)
     progress("keyboard", 0, 0)
-    background = _background(film)
-    if named is None:
-        ways = find_keyboards(background)
-        if not ways:
-            raise InputError(
-                f"{video}: no keyboard found; show where it is with `pianomime pick {video}`"
-            )
-        seen = ways[0].describe()
-        # Which octave it is only the notes can tell, and each way takes memory.
-        planes = [way.plane for way in (ways if score is not None else ways[:1])]
-    else:
-        seen = named.describe()
-        planes = [named.plane.zoomed(1 / film.zoom)]
-        ways = []
-    size = (round(film.width / film.zoom), round(film.height / film.zoom))
-    with ExitStack() as records:
-        lights = [records.enter_context(LightRecord(len(ZONES))) for _ in planes]
-        readers = [KeyLight(plane, size) for plane in planes]
-        sightings = _watch(film, readers, lights, model, progress)
-        progress("notes", 0, 0)
-        best, tracks, offset = _best_way(sightings, size, planes, lights, score, config.offset)
-        del sightings  # what is no longer needed goes: hours of it take much memory
-        plane, light = planes[best], lights[best]
-        if ways:
-            seen = ways[best].describe()
-            if len(ways) > 1 and offset is None:
-                lowest = key_name(int(np.flatnonzero(ways[best].seen)[0]))
-                remarks.append(
-                    f"the video does not tell the octave: the lowest key seen is taken for {lowest}"
-                    " (a MIDI file would tell)"
-                )
-        _check_hands(video, tracks, remarks)
-        remarks += _hidden(light)
-        if len(tracks) == _MOST_FRAMES:
-            remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
-        score, facts = _score(film, score, offset, tracks, light, config, remarks)
-    # These become the plan, and are worked on in place.
-    fingertips = raised(tracks.points, score.frames())
-    fingers = find_note_fingers(score, fingertips, tracks.seen)
-    parallax = take_back_parallax(fingertips, score, fingers)
-    fingers = find_note_fingers(score, fingertips, tracks.seen)
-    plan = align(score, fingertips, fingers, config.align)
-    if fingers.guessed.any():
-        remarks.append(
-            f"{int(fingers.guessed.sum())} of {len(score)} notes have no finger near their key: "
-            "theirs is a guess"
-        )
-    if plan.dropped:
-        remarks.append(f"{plan.dropped} of {len(score)} notes are played by no finger")
-    for first, end, hand in poorly_seen(tracks):
-        which = "left" if hand == LEFT else "right"
-        remarks.append(f"the {which} hand is not seen from {first:.1f} s to {end:.1f} s")
-    found = tracks.found
+    views = _find_views(given)
+    seen = _watch(given, views, progress)
+    timed = seen.timed
+    # Worked on in place: these become the plan.
+    fingertips = raised(seen.tracks.points, timed.score.frames())
+    fingers = find_note_fingers(timed.score, fingertips, seen.tracks.seen)
+    parallax = take_back_parallax(fingertips, timed.score, fingers)
+    fingers = find_note_fingers(timed.score, fingertips, seen.tracks.seen)
+    plan = align(timed.score, fingertips, fingers, config.align)
+    remarks = [
+        *seen.remarks,
+        *timed.remarks,
+        *remark.on_fingering(fingers, plan),
+        *remark.on_lost_hands(seen.tracks),
+    ]
     quality: dict[str, Any] = {
-        "keyboard": seen,
-        "seconds": len(tracks) / FRAME_RATE,
-        "both_hands_found": round(float(found.all(axis=1).mean()), 4),
-        "left_hand_found": round(float(found[:, 0].mean()), 4),
-        "right_hand_found": round(float(found[:, 1].mean()), 4),
-        "points_mended": round(float(tracks.mended.mean()), 4),
-        "ghost_hands": tracks.ghosts,
-        "left_right_swaps": tracks.swaps,
-        "notes": len(score),
+        "keyboard": seen.view.description,
+        **_quality_of_hands(seen.tracks),
+        "notes": len(timed.score),
         "notes_guessed": int(fingers.guessed.sum()),
         "parallax_millimetres": round(parallax, 2),
         "align": config.align,
-        **facts,
+        **timed.facts,
         "remarks": remarks,
     }
-    demonstration = Demonstration(score, plan, video.name, plane.zoomed(film.zoom).matrix, quality)
-    return Retargeted(demonstration, film, plane, tracks, fingers, remarks)
+    homography = seen.view.plane.zoomed(given.film.zoom).matrix
+    demonstration = Demonstration(timed.score, plan, video.name, homography, quality)
+    return Retargeted(demonstration, given.film, seen.view.plane, seen.tracks, fingers, remarks)
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """The files that a user gave, read and checked."""
+
+    config: RetargetConfig
+    film: Film
+    score: Score | None
+    points: NamedPoints | None
+    hand_model: Path
+
+    @staticmethod
+    def read(video: Path, config: RetargetConfig) -> _Given:
+        """Everything that can be wrong with the files is found here, before the long work."""
+        if config.offset is not None and not abs(config.offset) <= MAX_SECONDS:
+            raise InputError(f"--offset must be a time in the video, not {config.offset:g} s")
+        points = None if config.points is None else read_points(config.points)
+        score = None if config.midi is None else Score.from_midi(config.midi)
+        film = Film(video)
+        if film.seconds > MAX_SECONDS:
+            raise InputError(f"{video}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
+        return _Given(config, film, score, points, find_hand_model(config.hand_model))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures as they are read [pixels]."""
+        return (
+            round(self.film.width / self.film.zoom),
+            round(self.film.height / self.film.zoom),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A way to see the keyboard in the video: its plane, and a line for the user.
+
+    Attributes:
+        plane: from pixels of the pictures as they are read to the world.
+        description: one line.
+        only_guess: the keyboard, where its octave is open and no MIDI file decides.
+    """
+
+    plane: Plane
+    description: str
+    only_guess: Keyboard | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Timed:
+    """The score in the time of the video, facts for `Demonstration.quality`, and remarks."""
+
+    score: Score
+    facts: dict[str, Any]
+    remarks: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What one pass over the video showed, in the best view."""
+
+    view: _View
+    tracks: HandTracks
+    timed: _Timed
+    remarks: list[str]
+
+
+def _find_views(given: _Given) -> list[_View]:
+    """The ways to see the keyboard, the likeliest first: one, or one for each possible octave."""
+    film = given.film
+    background = _background(film)
+    if given.points is not None:
+        return [_View(given.points.plane.zoomed(1 / film.zoom), given.points.describe())]
+    keyboards = find_keyboards(background)
+    if not keyboards:
+        raise InputError(
+            f"{film.path}: no keyboard found; mark where it is with `pianomime pick {film.path}`"
+        )
+    if given.score is None:
+        # Only notes can decide the octave, so the likeliest one is assumed.
+        open_octave = len(keyboards) > 1
+        likeliest = keyboards[0]
+        return [_View(likeliest.plane, likeliest.describe(), likeliest if open_octave else None)]
+    return [_View(keyboard.plane, keyboard.describe()) for keyboard in keyboards]
 
 
 def _background(film: Film) -> NDArray[np.float32]:
-    """The grey picture (height, width), 0..1, that stays when hands and lights come and go."""
+    """Median of some grey pictures (height, width), 0..1: without hands and lights."""
     pictures = film.sample(_BACKGROUND_FRAMES)
     if not pictures:
         raise InputError(f"{film.path}: no picture in it can be read")
-    # Row by row: all of them at once, in grey, take several times their memory.
+    # Row by row: all pictures in grey at once take several times their memory.
     rows = [
         np.median([picture[row].mean(axis=1, dtype=np.float32) for picture in pictures], axis=0)
         for row in range(len(pictures[0]))
@@ -192,13 +226,37 @@ def _background(film: Film) -> NDArray[np.float32]:
     return np.asarray(np.stack(rows) / 255, np.float32)
 
 
-def _watch(
-    film: Film, readers: list[KeyLight], lights: list[LightRecord], model: Path, progress: Progress
+def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
+    """Read the video once: hands, keys, and from these the best view and the score."""
+    with ExitStack() as records:
+        lights = [records.enter_context(LightRecord(len(ZONES))) for _ in views]
+        sightings = _detect(given, views, lights, progress)
+        progress("notes", 0, 0)
+        best, tracks, offset = _best_view(given, views, sightings, lights)
+        del sightings  # in hours of video, they take much memory
+        view, light = views[best], lights[best]
+        if not tracks.seen.any():
+            raise InputError(f"{given.film.path}: no hands are seen playing")
+        remarks = [] if view.only_guess is None else [remark.on_octave(view.only_guess)]
+        remarks += [*remark.on_missing_hands(tracks), *remark.on_keyboard(light)]
+        if len(tracks) == _MOST_FRAMES:
+            remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
+        if given.score is None or offset is None:
+            timed = _read_score(given.film, tracks, light)
+        else:
+            timed = _place_midi(given, given.score, offset, len(tracks) / FRAME_RATE)
+    return _Seen(view, tracks, timed, remarks)
+
+
+def _detect(
+    given: _Given, views: list[_View], lights: list[LightRecord], progress: Progress
 ) -> Sightings:
-    """In one pass over the film find the hands in each frame, and fill the records."""
+    """Detect the hands in each frame and record the light of the keys, in one pass."""
+    film = given.film
+    readers = [KeyLight(view.plane, given.size) for view in views]
     sightings = Sightings()
     total = round(film.seconds * FRAME_RATE)
-    with HandDetector(model) as detector:
+    with HandDetector(given.hand_model) as detector:
         for number, frame in enumerate(islice(film.frames(FRAME_RATE), _MOST_FRAMES)):
             sightings.append(detector.detect(frame.picture, round(number * 1000 / FRAME_RATE)))
             for reader, light in zip(readers, lights, strict=True):
@@ -207,110 +265,60 @@ def _watch(
     return sightings
 
 
-def _best_way(
-    sightings: Sightings,
-    size: tuple[int, int],
-    planes: list[Plane],
-    lights: list[LightRecord],
-    score: Score | None,
-    given: float | None,
+def _best_view(
+    given: _Given, views: list[_View], sightings: Sightings, lights: list[LightRecord]
 ) -> tuple[int, HandTracks, Offset | None]:
-    """The plane under which the notes of the score, if there is one, are most under fingers."""
+    """The view in which most notes of the MIDI file, if there is one, have a finger on them."""
     best: tuple[int, HandTracks, Offset | None] | None = None
-    for number, (plane, light) in enumerate(zip(planes, lights, strict=True)):
-        tracks = follow(sightings, size, plane)
-        if score is None:
+    for number, (view, light) in enumerate(zip(views, lights, strict=True)):
+        tracks = follow(sightings, given.size, view.plane)
+        if given.score is None:
             return number, tracks, None
-        offset = estimate_offset(score, tracks, light, given)
-        if best is None or best[2] is None or offset.touched > best[2].touched + 0.02:
+        offset = estimate_offset(given.score, tracks, light, given.config.offset)
+        if best is None or best[2] is None or offset.touched > best[2].touched + _BETTER:
             best = number, tracks, offset
     assert best is not None
     return best
 
 
-def _check_hands(video: Path, tracks: HandTracks, remarks: list[str]) -> None:
-    if not tracks.seen.any():
-        raise InputError(f"{video}: no hands are seen playing")
-    for hand, name in ((LEFT, "left"), (RIGHT, "right")):
-        if not tracks.seen[hand]:
-            remarks.append(f"only one hand is seen: the {name} one is made up, at rest")
-
-
-def _hidden(light: LightRecord) -> list[str]:
-    """Remarks on when the keyboard does not look like itself: after a cut, or a move."""
-    far_end = list(ZONES).index("far end")
-    usual = np.median(light.every(max(1, len(light) // 2000), far_end).mean(axis=2), axis=0)
-    usual = usual - usual.mean()
-    if not usual.any():
-        return []  # none of it is within the picture
-    likeness = []
-    for block in light.blocks(far_end):
-        level = block.mean(axis=2)
-        level = level - level.mean(axis=1, keepdims=True)
-        scale = np.linalg.norm(level, axis=1) * np.linalg.norm(usual) + 1e-9
-        likeness.append(level @ usual / scale)
-    return [
-        f"the keyboard is not where it was, or hidden, from {first:.1f} s to {end:.1f} s"
-        for first, end in stretches(np.concatenate(likeness) < 0.5)
-    ]
-
-
-def _score(
-    film: Film,
-    score: Score | None,
-    offset: Offset | None,
-    tracks: HandTracks,
-    light: LightRecord,
-    config: RetargetConfig,
-    remarks: list[str],
-) -> tuple[Score, dict[str, Any]]:
-    """What is played, timed by the video, and figures about it."""
-    seconds = len(tracks) / FRAME_RATE
-    if score is None or offset is None:
-        read = read_notes(light, tracks, film.path.stem)
-        if not len(read.score):
-            raise InputError(
-                f"{film.path}: no keys are seen going down or lighting up; name what is played "
-                "with --midi"
-            )
-        if not read.lit:
-            remarks.append(
-                "no keys light up: the notes are read off keys that change their shade when they "
-                "go down, and many are missed (a MIDI file would tell)"
-            )
-        if read.touched < _FEW_TOUCHED:
-            remarks.append(
-                f"the notes are read off the video and doubtful: {read.touched:.0%} have a finger "
-                "on their key"
-            )
-        return on_grid(read.score), {
-            "notes_from": "video, from keys that " + ("light up" if read.lit else "go down"),
-            "notes_touched": round(read.touched, 4),
-        }
-    if config.offset is None and offset.touched < _TOO_FEW_TOUCHED:
+def _read_score(film: Film, tracks: HandTracks, light: LightRecord) -> _Timed:
+    """The score read from the video itself."""
+    read = read_notes(light, tracks, film.path.stem)
+    if not len(read.score):
         raise InputError(
-            f"{config.midi} is not what is played in {film.path}: at best {offset.touched:.0%} of "
-            "its notes have a finger on their key (--offset makes me go on all the same)"
+            f"{film.path}: no keys are seen going down or lighting up; give what is played with "
+            "--midi"
         )
-    if not offset.matches:
+    remarks = []
+    if not read.lit:
         remarks.append(
-            f"{config.midi} may not be what is played: {offset.touched:.0%} of its notes have a "
-            f"finger on their key, {offset.by_chance:.0%} would by chance"
+            "no keys light up: notes are read from keys that change their shade when they go down, "
+            "and many are missed (a MIDI file would have them)"
         )
+    if read.touched < _FEW_TOUCHED:
+        remarks.append(
+            f"the notes are read from the video and doubtful: {read.touched:.0%} have a finger on "
+            "their key"
+        )
+    facts = {
+        "notes_from": "video, from keys that " + ("light up" if read.lit else "go down"),
+        "notes_touched": round(read.touched, 4),
+    }
+    return _Timed(on_grid(read.score), facts, remarks)
+
+
+def _place_midi(given: _Given, score: Score, offset: Offset, seconds: float) -> _Timed:
+    """The MIDI file's score in the time of a video of `seconds`."""
+    midi, film = given.config.midi, given.film.path
+    if given.config.offset is None and offset.touched < _TOO_FEW_TOUCHED:
+        raise InputError(
+            f"{midi} is not what is played in {film}: at best {offset.touched:.0%} of its notes "
+            "have a finger on their key (give --offset to go on anyway)"
+        )
+    remarks = remark.on_midi(str(midi), score, offset, seconds)
     begin, end = -offset.seconds, seconds - offset.seconds
     if end <= score.onset[0] or begin >= score.duration:
-        raise InputError(f"{config.midi}: no note falls within {film.path} at this offset")
-    early = int((score.onset < begin - 0.1).sum())
-    late = int((score.onset >= end).sum())
-    if early:
-        remarks.append(f"{early} notes of the MIDI file come before the video begins")
-    if late:
-        remarks.append(f"{late} notes of the MIDI file come after the video ends")
-    if seconds > score.duration + offset.seconds + 2:
-        remarks.append(
-            f"the video goes on for {seconds - score.duration - offset.seconds:.1f} s after the "
-            "MIDI file's last note"
-        )
+        raise InputError(f"{midi}: no note falls within {film} at this offset")
     if begin > 0:
         timed = score.clip(begin, end)
     else:
@@ -318,9 +326,23 @@ def _score(
         timed = replace(
             cut, onset=cut.onset - begin, offset=cut.offset - begin, pedal=cut.pedal - begin
         )
-    return on_grid(timed), {
-        "notes_from": "" if config.midi is None else config.midi.name,
+    facts = {
+        "notes_from": "" if midi is None else midi.name,
         "offset_seconds": round(offset.seconds, 4),
         "notes_touched": round(offset.touched, 4),
         "notes_touched_by_chance": round(offset.by_chance, 4),
+    }
+    return _Timed(on_grid(timed), facts, remarks)
+
+
+def _quality_of_hands(tracks: HandTracks) -> dict[str, Any]:
+    """How well the hands were seen, for `Demonstration.quality`."""
+    return {
+        "seconds": len(tracks) / FRAME_RATE,
+        "both_hands_found": round(float(tracks.found.all(axis=1).mean()), 4),
+        "left_hand_found": round(float(tracks.found[:, LEFT].mean()), 4),
+        "right_hand_found": round(float(tracks.found[:, RIGHT].mean()), 4),
+        "points_mended": round(float(tracks.mended.mean()), 4),
+        "ghost_hands": tracks.ghosts,
+        "left_right_swaps": tracks.swaps,
     }

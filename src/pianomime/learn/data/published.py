@@ -1,20 +1,22 @@
-"""Demonstrations from the data that the PianoMime authors published, and from arrays like them.
+"""Reader of the data that the PianoMime authors published, and of arrays in the same form.
 
-Known faults are repaired: points that were never seen and stand where the robot rests (z above
-0.1), an older convention for z of pressing fingers, presses that were left over when a hand was not
-found, fingers that press keys nobody asked for, and jumps of single frames.
+Demonstrations: known faults are repaired. These are points that were never detected and are in the
+robot's rest pose (z above 0.1 m), an older convention for z of pressing fingers, presses that were
+left over when a hand was not detected, fingers that press keys which are not in the goal, and jumps
+of single frames. An .npz file may have for each clip its `song_group`, its `split`, and whether it
+is `odd`, which is that nothing can be learned from it; such a clip is in the split "odd".
 
-An .npz file may tell of each clip its `song_group`, its `split`, and whether it is `odd`, of which
-nothing can be learned; such a clip is in the split "odd".
+Experts: recorded joints, keys and controls become episodes in our order of joints.
 """
 
 from __future__ import annotations
 
 import importlib
+import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,55 +27,136 @@ from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
 from pianomime.plan.demonstration import TRAIN, Demonstration, on_grid
-from pianomime.video.align import HIGH
-from pianomime.video.hands.strays import strays
-from pianomime.video.hands.tracks import at_rest
-from pianomime.world.parameters import key_centres
+from pianomime.plan.fingertip_plan import HOVER_HEIGHT
+from pianomime.track import IkTracker
+from pianomime.video.hands.repair import at_rest, outliers
+from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT, POINTS_SIZE
+from pianomime.world.parameters import key_centres, key_travel
+from pianomime.world.state import PRESSED_WITHIN
+
+if TYPE_CHECKING:
+    from pianomime.learn.data.episode import Episode
 
 _ON_KEY = 0.005
-"""[m] along the keyboard from the middle of a key, within which a finger at z = 0 presses it."""
-_NEVER_SEEN = 0.1
-"""[m] z from which a point stands where the robot rests."""
+"""[m] Distance along the keyboard from the middle of a key within which a finger at z = 0 presses
+it."""
+_UNDETECTED_HEIGHT = 0.1
+"""[m] z above which a point was not detected and is in the robot's rest pose."""
 _JUMP = 0.10
-"""[m] A point this far from where the frames before and after have it was seen wrongly."""
+"""[m] A point this far from its neighbours in time was detected wrongly."""
 _WIDTHS = (212, 184)
 """Columns of the high-level data set's state and action."""
-_TIPS, _FINGERS = 36, 10
 _ODD = "odd"
 
 
-def read_published(source: Path, most: int | None = None) -> Iterator[tuple[Demonstration, int]]:
-    """Demonstrations of a data set, one after the other, and how many there are.
+def read_published(source: Path, limit: int | None = None) -> Iterator[tuple[Demonstration, int]]:
+    """Demonstrations of a data set, one after the other, and number of clips.
 
     Args:
         source: a folder with a zarr data set, or an .npz file.
-        most: of them at most.
+        limit: read only so many; None for all.
 
     Raises:
         OSError: there is no such file, or it cannot be read.
-        InputError: the data are not of a kind that is known, or none are asked for.
+        InputError: the data are not of a known kind, or the limit is below 1.
     """
-    if most is not None and most < 1:
-        raise InputError(f"{most} clips are none: 1 at least are needed")
+    if limit is not None and limit < 1:
+        raise InputError(f"the number of clips must be 1 or more, not {limit}")
     clips = _zarr(source) if source.is_dir() else _npz(source)
     names = [f"{source.stem}-{number:03d}" for number in range(len(clips))]
     if len(clips) == 1:
         names = [source.stem]
-    total = len(clips) if most is None else min(most, len(clips))
+    total = len(clips) if limit is None else min(limit, len(clips))
     for clip, name in zip(clips[:total], names, strict=False):
         made = demonstration_of(clip.fingertips, clip.goal, name, source.name)
         yield replace(made, song=clip.song, split=clip.split), total
 
 
-def songs_and_splits(
+def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Episode, int]]:
+    """Episodes of PianoMime's published experts, each with the number of all.
+
+    Args:
+        experts: .npz with clip_id, length, qpos_1e4, qvel_500, key_state_255 and ctrl_1e4.
+        demonstrations: .npz with clip_id, length, fingertips, finger_key and goal_packed of at
+            least the same clips; song_group, split and odd are optional.
+
+    Raises:
+        InputError: the files are not what they should be.
+    """
+    # Late: `import-demos` works without the extra that episodes need.
+    from pianomime.learn.data.episode import Episode, empty_columns, fill_columns
+
+    recorded = _arrays(experts, "clip_id length qpos_1e4 qvel_500 key_state_255 ctrl_1e4")
+    human = _arrays(
+        demonstrations, "clip_id length fingertips finger_key goal_packed", "song_group split odd"
+    )
+    for path, arrays, column in (
+        (experts, recorded, "ctrl_1e4"),
+        (demonstrations, human, "goal_packed"),
+    ):
+        fits = arrays["length"].shape == arrays["clip_id"].shape
+        if not fits or arrays["length"].sum() != len(arrays[column]):
+            raise InputError(f"{path}: the lengths of the clips do not add up")
+    place = {clip: row for row, clip in enumerate(human["clip_id"].tolist())}
+    human_ends = np.cumsum(human["length"])
+    song, split = _songs_and_splits(demonstrations, human, len(place))
+    ends = np.cumsum(recorded["length"])
+    for clip, end, length in zip(
+        recorded["clip_id"].tolist(), ends, recorded["length"], strict=True
+    ):
+        if clip not in place:
+            raise InputError(f"{demonstrations}: has no clip {clip}")
+        if human["length"][place[clip]] != length:
+            raise InputError(f"{demonstrations}: clip {clip} is not as long as in {experts}")
+        rows = slice(end - length, end)
+        theirs = slice(human_ends[place[clip]] - length, human_ends[place[clip]])
+        columns = empty_columns(int(length))
+        columns["joints"][:] = world_order(recorded["qpos_1e4"][rows] / 1e4)
+        columns["velocities"][:] = world_order(recorded["qvel_500"][rows] / 500.0)
+        keys = recorded["key_state_255"][rows] / 255.0
+        columns["keys"][:] = keys
+        columns["action"][:] = recorded["ctrl_1e4"][rows] / 1e4
+        # The keys in the next row are those after the action; the last row has no next one.
+        sounds = (1.0 - keys) * key_travel() <= PRESSED_WITHIN
+        columns["pressed"][:] = np.vstack([sounds[1:], sounds[-1:]])
+        tips = human["fingertips"][theirs].astype(float)
+        finger_key = human["finger_key"][theirs].astype(np.int8)
+        columns["base_control"][:] = _ik_controls(tips, columns["joints"])
+        goal = np.unpackbits(human["goal_packed"][theirs], axis=1)[:, :KEYS].astype(bool)
+        f1 = fill_columns(columns, goal, tips, finger_key)
+        name = f"clip{clip:03d}"
+        row = place[clip]
+        yield Episode(name, f1, "ik", columns, song[row], split[row]), len(ends)
+
+
+def world_order(recorded: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Joints (T, 54) in the order of a World, of published ones: left first, forearms last."""
+    left, right = recorded[:, : LAYOUT.hand_joints], recorded[:, LAYOUT.hand_joints :]
+    return np.hstack([np.roll(hand, LAYOUT.slides.stop, axis=1) for hand in (right, left)])
+
+
+def _ik_controls(
+    fingertips: NDArray[np.float64], joints: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Controls of inverse kinematics (T, 46) for targets (T, 2, 6, 3) [m] at joints (T, 54)."""
+    frames = len(fingertips)
+    idle = np.full((frames, 2, FINGER_COUNT), NO_KEY, np.int8)
+    no_notes = np.zeros(0, np.int8)
+    controller = IkTracker().start(FingertipPlan(fingertips, idle, no_notes, no_notes))
+    # The positions of the keys do not matter to it.
+    qpos = np.hstack([np.zeros((frames, KEYS)), joints])
+    return controller.controls(np.arange(frames), qpos)[0]
+
+
+def _songs_and_splits(
     path: Path, arrays: dict[str, NDArray[Any]], clips: int
 ) -> tuple[list[int], list[str]]:
-    """The song and the split of each clip, as far as a file of clips tells them.
+    """The song and the split of each clip, as far as a file of clips has them.
 
     Args:
         path: of the file.
         arrays: `song_group`, `split` and `odd` of each clip, where it has them.
-        clips: how many there are.
+        clips: number of clips.
 
     Raises:
         InputError: they are of another kind or number.
@@ -93,13 +176,13 @@ def songs_and_splits(
 def demonstration_of(
     fingertips: NDArray[np.float64], goal: NDArray[np.bool_] | None, title: str, source: str
 ) -> Demonstration:
-    """A demonstration of arrays as PianoMime makes them.
+    """A demonstration from arrays in the published form.
 
     Args:
         fingertips: (T, 2, 6, 3) world [m], hands (left, right).
-        goal: (T, 88) keys that should be down; None if only the fingers tell.
+        goal: (T, 88) keys that should be down; None to take them from the fingers.
         title: of the piece.
-        source: where it is from.
+        source: name of the data set.
     """
     tips, mended = _mend(np.asarray(fingertips, np.float64))
     pressing = _pressed(tips)
@@ -137,7 +220,7 @@ def demonstration_of(
         ).reshape(finger_key.shape)
     ] = NO_KEY
     points = tips[rows].copy()
-    points[..., 2] = HIGH
+    points[..., 2] = HOVER_HEIGHT
     frame, hand, finger = np.nonzero(finger_key >= 0)
     points[frame, hand, finger + 1, 1] = key_centres()[finger_key[frame, hand, finger], 1]
     points[frame, hand, finger + 1, 2] = 0.0
@@ -155,22 +238,26 @@ def demonstration_of(
 
 
 def _mend(tips: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    """The points with those that were never seen, or seen wrongly, put between their neighbours."""
-    if tips.ndim != 4 or tips.shape[1:] != (2, 6, 3) or not len(tips):
+    """Interpolate points that were never or wrongly detected; the points, and how many there were.
+
+    Raises:
+        InputError: they have another shape.
+    """
+    if tips.ndim != 4 or tips.shape[1:] != (2, POINT_COUNT, 3) or not len(tips):
         raise InputError(f"fingertips must be (T, 2, 6, 3), not {tips.shape}")
-    bad = tips[..., 2] > _NEVER_SEEN
-    for hand, point in np.ndindex(2, 6):
-        bad[:, hand, point] |= strays(tips[:, hand, point, :2], _JUMP)
+    bad = tips[..., 2] > _UNDETECTED_HEIGHT
+    for hand, point in np.ndindex(2, POINT_COUNT):
+        bad[:, hand, point] |= outliers(tips[:, hand, point, :2], _JUMP)
     # A finger that presses is where its key is.
     bad &= tips[..., 2] != 0.0
     unknown: NDArray[np.bool_] = ~np.all(np.isfinite(tips), axis=3)
     bad |= unknown
     mended = tips.copy()
     time = np.arange(len(tips))
-    for hand, point in np.ndindex(2, 6):
+    for hand, point in np.ndindex(2, POINT_COUNT):
         wrong = bad[:, hand, point]
         if wrong.all():
-            mended[unknown[:, hand, point], hand, point] = *at_rest(hand)[point], HIGH
+            mended[unknown[:, hand, point], hand, point] = *at_rest(hand)[point], HOVER_HEIGHT
         elif wrong.any():
             for axis in range(2):
                 mended[wrong, hand, point, axis] = np.interp(
@@ -180,7 +267,7 @@ def _mend(tips: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
 
 
 def _pressed(tips: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(T, 2, 5) the key under each finger whose z says that it presses, -1 for none."""
+    """(T, 2, 5) the key under each finger whose z means that it presses, -1 for none."""
     height = tips[:, :, 1:, 2]
     low = height <= 0.001
     if not low.any():
@@ -193,7 +280,7 @@ def _pressed(tips: NDArray[np.float64]) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, eq=False)
 class _Clip:
-    """Fingertips (T, 2, 6, 3), goals (T, 88) if they are told, and where in its data set it is."""
+    """Fingertips (T, 2, 6, 3) [m], goals (T, 88) if they are known, song and split."""
 
     fingertips: NDArray[np.float64]
     goal: NDArray[np.bool_] | None
@@ -206,7 +293,7 @@ def _npz(path: Path) -> list[_Clip]:
     if "fingertips" not in arrays:
         raise InputError(f"{path}: holds no fingertips")
     tips = arrays["fingertips"]
-    if tips.ndim != 4 or tips.shape[1:] != (2, 6, 3) or tips.dtype.kind not in "fiu":
+    if tips.ndim != 4 or tips.shape[1:] != (2, POINT_COUNT, 3) or tips.dtype.kind not in "fiu":
         raise InputError(f"{path}: fingertips must be numbers (T, 2, 6, 3), not {tips.shape}")
     goal: NDArray[np.bool_] | None = arrays.get("goal")
     packed = arrays.get("goal_packed")
@@ -221,7 +308,7 @@ def _npz(path: Path) -> list[_Clip]:
         raise InputError(f"{path}: the lengths of the clips must be whole numbers from 1 on")
     if int(length.sum()) != len(tips):
         raise InputError(f"{path}: the lengths of the clips do not add up to {len(tips)} frames")
-    song, split = songs_and_splits(path, arrays, len(length))
+    song, split = _songs_and_splits(path, arrays, len(length))
     ends = np.cumsum(length)
     return [
         _Clip(
@@ -251,7 +338,7 @@ def _zarr(folder: Path) -> list[_Clip]:
             raise InputError(f"{wanted}: state and action have {widths} columns, not {_WIDTHS}")
         # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers; what follows are
         # those of the frames to come.
-        action = np.asarray(group["action"][:, : _TIPS + _FINGERS])
+        action = np.asarray(group["action"][:, : POINTS_SIZE + 2 * FINGER_COUNT])
         ends = np.asarray(meta["episode_ends"]).astype(np.int64)
     except InputError:
         raise
@@ -265,10 +352,24 @@ def _zarr(folder: Path) -> list[_Clip]:
     for end in ends:
         rows = action[first : end + 1]
         first = int(end) + 1
-        tips = rows[:, :_TIPS].reshape(-1, 2, 6, 3).astype(np.float64)
-        keys = np.rint(rows[:, _TIPS:] * 89).astype(np.int64) - 1
+        tips = rows[:, :POINTS_SIZE].reshape(-1, 2, POINT_COUNT, 3).astype(np.float64)
+        keys = np.rint(rows[:, POINTS_SIZE:] * (KEYS + 1)).astype(np.int64) - 1
         goal = np.zeros((len(rows), KEYS), bool)
         frame, _ = np.nonzero((keys >= 0) & (keys < KEYS))
         goal[frame, keys[(keys >= 0) & (keys < KEYS)]] = True
         clips.append(_Clip(tips, goal))
     return clips
+
+
+def _arrays(path: Path, names: str, more: str = "") -> dict[str, NDArray[Any]]:
+    """Arrays of a file by name, and those of `more` that it has."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            there = [name for name in more.split() if name in file]
+            return {name: file[name] for name in [*names.split(), *there]}
+    except FileNotFoundError:
+        raise InputError(f"{path}: does not exist") from None
+    except KeyError as error:
+        raise InputError(f"{path}: has no {error.args[0]}") from error
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not an .npz file of arrays ({error})") from error

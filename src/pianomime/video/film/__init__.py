@@ -1,1 +1,1 @@
-"""The video file: decoded frames, read ahead, and the light on keys that is kept of them."""
+"""Video files: frames at a steady rate, and a record on disk of what was read in each."""

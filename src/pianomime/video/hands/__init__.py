@@ -1,1 +1,1 @@
-"""Where the hands are in a video."""
+"""Hands in a video: detection by MediaPipe, tracking over the whole video, repair."""

@@ -1,4 +1,8 @@
-"""From hands seen frame by frame to two tracks, left and right, without holes or jitter."""
+"""Tracking: from hands detected frame by frame to one gapless, smooth track of each hand.
+
+Which detection is which hand is decided over the whole video, by the cheapest history (a beam
+search over frames).
+"""
 
 from __future__ import annotations
 
@@ -10,34 +14,24 @@ from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from pianomime.plan import LEFT, RIGHT
+from pianomime.video.hands.repair import repair
 from pianomime.video.hands.sightings import Sighting, Sightings
-from pianomime.video.hands.strays import strays
 from pianomime.video.keyboard.plane import Plane
-from pianomime.video.stretches import stretches
 
 _SAME_HAND = 0.05
-"""[m] Two sightings whose points are nearer than this on average are one hand seen twice."""
+"""[m] Two detections whose points are closer than this on average are one hand detected twice."""
 _JUMP = 0.10
-"""[m] a frame: a hand that moves as far costs as much as a wrong label that is quite sure."""
+"""[m] Movement in one frame that costs 1; the cost grows with its square."""
 _GHOST = 3.0
-"""Cost of taking a sighting for no hand at all."""
+"""Cost of taking a detection for neither hand."""
 _ORDER = 4.0
-"""Cost of the right hand lying to the left of the left one."""
+"""Cost of a right hand to the left of the left hand."""
 _HISTORIES = 3
-"""Ways to tell the hands apart that are followed."""
-_STRAY = 0.025
-"""[m] A point this far from where its neighbours in time have it was seen wrongly."""
-_SMOOTH = 5
-"""Frames that are smoothed together, with a parabola, which has no lag."""
+"""Width of the beam."""
 FEWEST = 0.05
-"""Share of the frames in which a hand must be seen to be one: less are ghosts."""
-_AT_EASE = np.array(
-    [[0.19, 0.0], [0.055, 0.1], [0.0, 0.03], [-0.005, 0.0], [0.0, -0.025], [0.01, -0.05]]
-)
-"""(6, 2) [m] of a left hand that is never seen, about its place along the keyboard."""
+"""Share of the frames in which a hand must be detected to be taken for one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +39,13 @@ class HandTracks:
     """Both hands in every frame.
 
     Attributes:
-        points: (T, 2, 6, 2) world x, y [m]; hands (left, right); points as in `plan.POINTS`.
-            Single precision, a tenth of a micrometre: in hours, bytes count.
-        found: (T, 2) bool, hands that were seen in a frame; the others are filled in. A hand that
-            is hardly ever seen (`FEWEST`) is taken for a ghost: it is never found, and made up.
-        mended: (T, 2, 6) bool, points that were seen but wrongly, and filled in.
-        ghosts: number of sightings that were taken for no hand.
-        swaps: number of frames in which MediaPipe took left for right.
+        points: (T, 2, 6, 2) world x, y [m]; hands (left, right); points as in `plan.POINTS`. In
+            single precision, to save memory in hours of video; it resolves 0.1 micrometres.
+        found: (T, 2) bool, frames in which each hand was detected; the others are interpolated. A
+            hand in a smaller share of the frames than `FEWEST` is never found, and at rest.
+        mended: (T, 2, 6) bool, points that were outliers and have been replaced.
+        ghosts: number of detections that were taken for neither hand.
+        swaps: number of frames in which MediaPipe mistook one hand for the other.
     """
 
     points: NDArray[np.float32]
@@ -66,11 +60,11 @@ class HandTracks:
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """(2,) hands that are there; the others are made up and play nothing."""
+        """(2,) bool: hands that are in the video; the others are at rest and play nothing."""
         return np.asarray(self.found.any(axis=0))
 
     def seen_points(self, step: int = 1) -> NDArray[np.float32]:
-        """(ceil(T / step), H, 6, 2) of the H hands that are there, in every step-th frame."""
+        """(ceil(T / step), H, 6, 2) Points of the H hands in the video, every step-th frame [m]."""
         points = self.points[::step]
         return points if self.seen.all() else points[:, self.seen]
 
@@ -78,12 +72,12 @@ class HandTracks:
 def follow(
     sightings: Iterable[Iterable[Sighting]], size: tuple[int, int], plane: Plane
 ) -> HandTracks:
-    """Decide over the whole clip which sighting is which hand, then repair.
+    """Track both hands over the whole video.
 
     Args:
-        sightings: those of each frame, 20 a second.
+        sightings: hands detected in each frame, at 20 Hz, in shares of the picture's size.
         size: width and height of the picture [pixels].
-        plane: of that picture.
+        plane: plane of the keyboard in that picture.
     """
     seen = Sightings()
     doubles = 0
@@ -92,7 +86,7 @@ def follow(
         single = _without_doubles(hands)
         doubles += len(hands) - len(single)
         seen.append(single)
-    # In a mirror every left hand looks like a right one; who sits where tells.
+    # In a mirrored video left hands look like right hands; their order along the keyboard decides.
     mirrored = _seen_in_mirror(seen)
     chosen = _assign(seen, mirrored)
     points = np.full((len(seen), 2, 6, 2), np.nan, np.float32)
@@ -112,13 +106,13 @@ def follow(
             points[:, hand], found[:, hand] = np.nan, False
     mended: NDArray[np.bool_] = np.zeros(points.shape[:3], bool)
     for hand in (LEFT, RIGHT):
-        mended[:, hand] = _repair(points[:, hand], hand)
+        mended[:, hand] = repair(points[:, hand], hand)
     mended &= found[..., None]
     return HandTracks(points, found, mended, ghosts + doubles, swaps)
 
 
 def _without_doubles(hands: list[Sighting]) -> list[Sighting]:
-    """Those of the hands, in the world, that are not another one again; the surer ones."""
+    """The hands, in the world, without those that were detected twice; the surer ones are kept."""
     kept: list[Sighting] = []
     for hand in sorted(hands, key=lambda each: -abs(each.right - 0.5)):
         if not np.isfinite(hand.points).all():
@@ -132,6 +126,7 @@ def _without_doubles(hands: list[Sighting]) -> list[Sighting]:
 
 
 def _seen_in_mirror(seen: Sightings) -> bool:
+    """Whether left and right labels contradict the order of the hands along the keyboard."""
     difference = 0.0
     for frame in seen:
         if len(frame) == 2:
@@ -142,24 +137,25 @@ def _seen_in_mirror(seen: Sightings) -> bool:
 
 @cache
 def _options(hands: int) -> tuple[tuple[int, int], ...]:
-    """Every way to take one of the hands for the left and one for the right, -1 for none."""
+    """Every choice of a left and a right hand among the detections of a frame, -1 for none."""
     ways = permutations([*range(hands), -1, -1], 2)
     return tuple(dict.fromkeys(way for way in ways if way[0] != way[1] or way[0] < 0))
 
 
 def _assign(seen: Sightings, mirrored: bool) -> list[tuple[int, int]]:
-    """For each frame which sighting is left and which right, -1 for none: the cheapest history.
+    """For each frame the index of the left and of the right detection, -1 for none.
 
-    A history remembers where it last saw each hand; of those that end alike one is kept.
+    A history remembers where each hand was last seen; of those with the same last choice, only
+    the cheapest is kept.
     """
     histories = {0: _History.start()}
-    # For each frame and option, the number of the option before: in hours, bytes count.
+    # For each frame and option, the option of the frame before, as bytes to save memory.
     back: list[bytes] = []
     for frame in seen:
         options = _options(len(frame))
         following: dict[int, _History] = {}
         came_from = bytearray(len(options))
-        # Those far behind do not catch up.
+        # Only the cheapest histories go on.
         leading = sorted(histories, key=lambda number: histories[number].cost)[:_HISTORIES]
         for before in leading:
             history = histories[before]
@@ -181,6 +177,8 @@ def _assign(seen: Sightings, mirrored: bool) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True, eq=False)
 class _History:
+    """One choice of hands in all frames so far: cost, last points and frames since, per hand."""
+
     cost: float
     last: tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]
     age: tuple[int, int]
@@ -190,12 +188,12 @@ class _History:
         return _History(0.0, (None, None), (0, 0))
 
     def moves(self, frame: list[Sighting]) -> list[list[float]]:
-        """What it costs each hand to have gone to each sighting."""
+        """Cost of the movement of each hand to each detection."""
         return [
             [
                 0.0
                 if before is None
-                # The longer unseen, the farther it may have gone.
+                # A hand that was not seen for longer may have moved further.
                 else min((_distance(points, before) / _JUMP) ** 2 / (1 + age), 6.0)
                 for points, _ in frame
             ]
@@ -209,7 +207,7 @@ class _History:
         moves: list[list[float]],
         mirrored: bool,
     ) -> _History:
-        """The history that goes on with an option: the sighting of each hand, -1 for none."""
+        """The history with one more frame, given the detection of each hand, -1 for none."""
         cost = self.cost + _GHOST * (len(frame) - sum(which >= 0 for which in option))
         last = list(self.last)
         age = [frames + 1 for frames in self.age]
@@ -230,42 +228,3 @@ def _distance(points: NDArray[np.float64], others: NDArray[np.float64]) -> float
     """Mean distance [m] of points (6, 2) from others."""
     off = points - others
     return float(np.sqrt((off * off).sum(axis=1)).mean())
-
-
-def _repair(points: NDArray[np.float32], hand: int) -> NDArray[np.bool_]:
-    """In one hand's points (T, 6, 2) mend strays, fill gaps, smooth; what strayed (T, 6)."""
-    frames = len(points)
-    stray = np.zeros((frames, 6), bool)
-    if not np.isfinite(points).any():
-        points[:] = at_rest(hand)
-        return stray
-    time = np.arange(frames)
-    # Point by point: hours of all of them at once take much memory.
-    for point in range(6):
-        stray[:, point] = strays(points[:, point], _STRAY)
-        known = np.isfinite(points[:, point]).all(axis=1) & ~stray[:, point]
-        for axis in range(2):
-            course = np.interp(time, time[known], points[known, point, axis])
-            if frames >= _SMOOTH:
-                course = savgol_filter(course, _SMOOTH, 2, mode="interp")
-            points[:, point, axis] = course
-    return stray
-
-
-def at_rest(hand: int) -> NDArray[np.float64]:
-    """(6, 2) world x, y [m] of a hand that was never seen."""
-    side = -1 if hand == LEFT else 1
-    return _AT_EASE * [1, -side] + [0.0, 0.2 * side]
-
-
-def poorly_seen(tracks: HandTracks) -> list[tuple[float, float, int]]:
-    """Stretches of half a second or more in which a hand was not seen.
-
-    Returns:
-        From and to [s], and the hand; in order.
-    """
-    return sorted(
-        (first, end, hand)
-        for hand in (LEFT, RIGHT)
-        for first, end in stretches(~tracks.found[:, hand])
-    )

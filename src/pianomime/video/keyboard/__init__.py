@@ -1,1 +1,1 @@
-"""Where the keyboard is in a video."""
+"""The keyboard in a picture: found by its black keys, or from points that a person marked."""

@@ -1,4 +1,4 @@
-"""The keyboard in a picture: its plane, which keys are seen, and how sure that is."""
+"""The keyboard in a picture: its plane, which keys are seen, and how certain that is."""
 
 from __future__ import annotations
 
@@ -6,35 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from pianomime.keyboard import BLACK, KEYS, key_name
+from pianomime.video.keyboard.geometry import BLACK_FRONT, FAR, FRONT, LEFT_EDGE, WHITE_WIDTH
+from pianomime.video.keyboard.lines import Lines, black_place, find_lines, sample
 from pianomime.video.keyboard.plane import Plane, fit_plane
-from pianomime.video.keyboard.search import (
-    Lines,
-    black_place,
-    find_lines,
-    line_through,
-    sample,
-)
-from pianomime.world.parameters import key_centres, key_half_sizes
+from pianomime.video.keyboard.refine import refine
+from pianomime.world.parameters import key_centres
 
-WHITE_WIDTH = 0.0235
-"""[m] from one white key to the next in the world."""
-
-_WHITES = np.flatnonzero(~BLACK)
 _C1 = 2
-"""Number of the lowest C among the white keys."""
-FAR, FRONT = -0.075, 0.075
-"""[m] world x of the two ends of the white keys."""
-BLACK_FRONT = float(key_centres()[1, 0] + key_half_sizes()[1, 0])
-"""[m] world x where the black keys end toward the player."""
+"""Index of the lowest C among the white keys."""
 _MOST_DOUBT = 0.25
-"""Black keys, of those found, that may be missing or too many."""
-_OFF_LINE = 0.003
-"""[m]"""
-LEFT_EDGE = float(key_centres()[0, 1]) - WHITE_WIDTH / 2
-"""[m] world y of the left edge of the lowest key."""
+"""Largest share of the black keys found that may be missing or unexpected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +71,7 @@ def find_keyboards(picture: NDArray[np.float32]) -> list[Keyboard]:
         flipped = (zones.front < zones.far) != mirrored
         for name in _namings(picture, lines, zones, flipped):
             rough = _rough_plane(lines, zones, name)
-            refined = _refine(picture, rough)
+            refined = refine(picture, rough)
             if refined is not None:
                 plane, seen, metres, pixels = refined
                 found.append(Keyboard(plane, seen, metres, pixels, mirrored, name.doubt))
@@ -245,160 +228,3 @@ def _rough_plane(lines: Lines, zones: _Zones, naming: _Naming) -> Plane:
             n = naming.first + naming.direction * place
             world.append([x, LEFT_EDGE + WHITE_WIDTH * n])
     return fit_plane(np.array(pixels), np.array(world))
-
-
-def _refine(
-    picture: NDArray[np.float32], plane: Plane
-) -> tuple[Plane, NDArray[np.bool_], float, float] | None:
-    """Fit the plane to the edges of keys, found to a fraction of a pixel near where it has them.
-
-    An edge says where it is across itself, nothing of where along.
-    """
-    seen = np.zeros(KEYS, bool)
-    for window in (0.4, 0.25, 0.2):
-        edges = _find_edges(picture, plane, window)
-        if len(edges.pixels) < 12:
-            return None
-
-        def residual(free: NDArray[np.float64], edges: _Edges = edges) -> NDArray[np.float64]:
-            world = Plane(np.append(free, 1.0).reshape(3, 3)).to_world(edges.pixels)
-            off = world[np.arange(len(world)), edges.axis] - edges.value
-            return np.asarray(1000 * off * edges.weight)
-
-        scale = plane.matrix / plane.matrix[2, 2]
-        start = scale.ravel()[:8]
-        # The columns differ by orders of magnitude.
-        solution = least_squares(residual, start, loss="soft_l1", x_scale="jac", max_nfev=60)
-        if not np.isfinite(solution.x).all():
-            return None
-        plane = Plane(np.append(solution.x, 1.0).reshape(3, 3))
-        seen = edges.seen
-    edges = _find_edges(picture, plane, 0.2)
-    if len(edges.pixels) < 12:
-        return None
-    world = plane.to_world(edges.pixels)
-    off = np.abs(world[np.arange(len(world)), edges.axis] - edges.value)
-    metres = float(np.median(off))
-    sizes = np.linalg.norm(
-        plane.to_pixels([[0, 0.1], [0.05, 0]]) - plane.to_pixels([[0, -0.1], [-0.05, 0]]), axis=1
-    ) / (0.2, 0.1)
-    return plane, seen, metres, metres * float(sizes.mean())
-
-
-@dataclass(frozen=True, eq=False)
-class _Edges:
-    """Places (E, 2) where the picture shows an edge whose world x (axis 0) or y (axis 1) is known.
-
-    Attributes:
-        pixels: (E, 2) column, row.
-        axis: (E,) int.
-        value: (E,) [m].
-        weight: (E,).
-        seen: (88,) keys with an edge.
-    """
-
-    pixels: NDArray[np.float64]
-    axis: NDArray[np.int64]
-    value: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    seen: NDArray[np.bool_]
-
-
-def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _Edges:
-    """Look for edges within `window` white keys of where a plane has them."""
-    pixels, axis, value, weight = [], [], [], []
-    seen = np.zeros(KEYS, bool)
-    span = np.linspace(-window, window, 33) * WHITE_WIDTH
-    # Dark lines between white keys, in front of the black ones.
-    whites = LEFT_EDGE + WHITE_WIDTH * np.arange(1, len(_WHITES))
-    rows = np.linspace(BLACK_FRONT + 0.012, FRONT - 0.008, 6)
-    gap, row = (each.ravel() for each in np.meshgrid(np.arange(len(whites)), rows, indexing="ij"))
-    world = np.stack(np.broadcast_arrays(row[:, None], whites[gap][:, None] + span), axis=-1)
-    profile = sample(picture, plane.to_pixels(world))
-    place, depth = _dip(profile, span)
-    good = depth > 0.02
-    pixels.append(plane.to_pixels(np.stack([row[good], whites[gap[good]] + place[good]], axis=-1)))
-    axis.append(np.ones(good.sum(), int))
-    value.append(whites[gap[good]])
-    weight.append(np.full(good.sum(), 1.0))
-    found = np.bincount(gap[good], minlength=len(whites)) >= 2
-    seen[_WHITES[:-1][found]] = seen[_WHITES[1:][found]] = True
-    # Ends: of black keys toward the player, of white keys toward the player and away.
-    free = np.array(
-        [
-            y
-            for white in range(len(_WHITES) - 1)
-            if _WHITES[white + 1] == _WHITES[white] + 1
-            for y in whites[white] + np.array([-0.25, 0.25]) * WHITE_WIDTH
-        ]
-    )
-    blacks = key_centres()[BLACK, 1]
-    centres = key_centres()[_WHITES, 1]
-    # Wide, and of less weight, for black keys are longer on most pianos than on the world's.
-    reach = np.linspace(-0.013, 0.013, 53)
-    for x, along, sign, trust in (
-        (BLACK_FRONT, blacks, 1, 0.23),
-        (FRONT, centres, -1, 0.33),
-        # Lids and glow make the far end doubtful.
-        (FAR, free, 1, 0.23),
-    ):
-        world = np.stack(np.broadcast_arrays(x + reach, along[:, None]), axis=-1)
-        profile = sample(picture, plane.to_pixels(world))
-        place, height = _step(sign * profile, reach)
-        good = height > 0.06
-        if good.sum() > 3:
-            # The edges of all keys are in one line; what is not is a shelf or a shadow.
-            at, slope = line_through(along[good], place[good])
-            good &= np.abs(place - at - slope * along) < _OFF_LINE
-        pixels.append(plane.to_pixels(np.stack([x + place[good], along[good]], axis=-1)))
-        axis.append(np.zeros(good.sum(), int))
-        value.append(np.full(good.sum(), x))
-        weight.append(np.full(good.sum(), trust))
-        if x == BLACK_FRONT:
-            seen[np.flatnonzero(BLACK)[good]] = True
-    return _Edges(
-        np.concatenate(pixels),
-        np.concatenate(axis),
-        np.concatenate(value),
-        np.concatenate(weight),
-        seen,
-    )
-
-
-def _dip(
-    profile: NDArray[np.float64], at: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where each profile (P, S) is darkest, between samples, and how deep the dip is."""
-    complete = np.asarray(np.isfinite(profile).all(axis=1))
-    filled = np.where(complete[:, None], profile, 0.0)
-    lowest = np.clip(filled.argmin(axis=1), 1, len(at) - 2)
-    place = at[lowest] + _vertex(filled, lowest) * (at[1] - at[0])
-    third = len(at) // 3
-    shoulder = np.minimum(filled[:, :third].max(axis=1), filled[:, -third:].max(axis=1))
-    depth = np.where(complete, shoulder - filled.min(axis=1), 0.0)
-    # A dip at the very end belongs to something else.
-    inner = (lowest > 2) & (lowest < len(at) - 3)
-    return place, np.where(inner, depth, 0.0)
-
-
-def _step(
-    profile: NDArray[np.float64], at: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where each profile (P, S) rises most, between samples, and by how much."""
-    complete = np.asarray(np.isfinite(profile).all(axis=1))
-    filled = np.where(complete[:, None], profile, 0.0)
-    wide = max(2, len(at) // 12)
-    rise = filled[:, 2 * wide :] - filled[:, : -2 * wide]
-    steepest = np.clip(rise.argmax(axis=1), 1, rise.shape[1] - 2)
-    place = at[steepest + wide] + _vertex(-rise, steepest) * (at[1] - at[0])
-    height = np.take_along_axis(rise, steepest[:, None], axis=1)[:, 0]
-    inner = (steepest > 1) & (steepest < rise.shape[1] - 2)
-    return place, np.where(complete & inner, height, 0.0)
-
-
-def _vertex(profile: NDArray[np.float64], lowest: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Offset (P,) of the minimum of the parabola through three samples, in samples."""
-    row = np.arange(len(profile))
-    before, here, after = (profile[row, lowest + step] for step in (-1, 0, 1))
-    curve = before - 2 * here + after
-    return np.where(curve > 0, 0.5 * (before - after) / np.where(curve > 0, curve, 1.0), 0.0)

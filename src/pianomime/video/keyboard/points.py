@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.keyboard import BLACK, KEYS, key_name
-from pianomime.video.keyboard.keyboard import FAR, FRONT, LEFT_EDGE, WHITE_WIDTH
+from pianomime.video.keyboard.geometry import FAR, FRONT, LEFT_EDGE, WHITE_WIDTH
 from pianomime.video.keyboard.plane import Plane, fit_plane_robustly
 from pianomime.world.parameters import key_centres, key_half_sizes
 

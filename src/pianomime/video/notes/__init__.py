@@ -1,1 +1,1 @@
-"""Which notes are played in a video, and by which fingers."""
+"""Notes in a video: from a MIDI file or from the keys, and the finger that plays each note."""

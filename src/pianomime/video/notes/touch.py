@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import BLACK
-from pianomime.video.keyboard.keyboard import BLACK_FRONT, FRONT
+from pianomime.video.keyboard.geometry import BLACK_FRONT, FRONT
 from pianomime.world.parameters import key_centres
 
 _FREE = 0.003

@@ -1,0 +1,153 @@
+"""Remarks on a video: one line each on what was not seen, hidden, guessed or left out."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_closing
+
+from pianomime.keyboard import FRAME_RATE, key_name
+from pianomime.music import Score
+from pianomime.plan import LEFT, RIGHT, FingertipPlan
+from pianomime.video.film.light_record import LightRecord
+from pianomime.video.hands.tracks import HandTracks
+from pianomime.video.keyboard.keyboard import Keyboard
+from pianomime.video.notes.fingers import NoteFingers
+from pianomime.video.notes.key_light import ZONES
+from pianomime.video.notes.offset import Offset
+
+_SHORTEST = 0.5
+"""[s] Shorter intervals are not reported."""
+_SOME_FRAMES = 2000
+"""Frames from which the usual look of the keyboard is taken."""
+_LEAST_LIKENESS = 0.5
+"""Correlation with the usual look below which the keyboard is hidden or moved."""
+_EARLY = 0.1
+"""[s] Notes that begin at most so long before the video are not reported."""
+_LONG_END = 2.0
+"""[s] Video after the last note that is not reported."""
+
+
+def intervals(holds: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Intervals of at least half a second in which something holds.
+
+    Args:
+        holds: (T,) bool, frame by frame; single frames in which it does not are ignored.
+
+    Returns:
+        Beginning and end of each interval [s].
+    """
+    closed = binary_closing(np.pad(holds, 2), np.ones(3))[2:-2]
+    edges = np.flatnonzero(np.diff(closed.astype(np.int8), prepend=0, append=0))
+    return [
+        (float(first / FRAME_RATE), float(end / FRAME_RATE))
+        for first, end in edges.reshape(-1, 2)
+        if end - first >= _SHORTEST * FRAME_RATE
+    ]
+
+
+def on_octave(keyboard: Keyboard) -> str:
+    """The remark that the video leaves the octave open.
+
+    Args:
+        keyboard: the keyboard in the octave that was assumed.
+    """
+    lowest = key_name(int(np.flatnonzero(keyboard.seen)[0]))
+    return (
+        f"the video leaves the octave open: its lowest key is assumed to be {lowest} "
+        "(a MIDI file would decide)"
+    )
+
+
+def on_missing_hands(tracks: HandTracks) -> list[str]:
+    """Remarks on hands that are not in the video."""
+    return [
+        f"only one hand is seen: the {name} one is made up, at rest"
+        for hand, name in ((LEFT, "left"), (RIGHT, "right"))
+        if not tracks.seen[hand]
+    ]
+
+
+def on_lost_hands(tracks: HandTracks) -> list[str]:
+    """Remarks on intervals in which a hand was not seen."""
+    return [
+        f"the {'left' if hand == LEFT else 'right'} hand is not seen from {first:.1f} s to "
+        f"{end:.1f} s"
+        for first, end, hand in poorly_seen(tracks)
+    ]
+
+
+def poorly_seen(tracks: HandTracks) -> list[tuple[float, float, int]]:
+    """Intervals of at least half a second in which a hand was not seen.
+
+    Returns:
+        Beginning and end [s] and the hand of each, in order of time.
+    """
+    return sorted(
+        (first, end, hand)
+        for hand in (LEFT, RIGHT)
+        for first, end in intervals(~tracks.found[:, hand])
+    )
+
+
+def on_keyboard(light: LightRecord) -> list[str]:
+    """Remarks on intervals in which the keyboard does not look as usual: after a cut, or a move."""
+    far_end = list(ZONES).index("far end")
+    some = light.every(max(1, len(light) // _SOME_FRAMES), far_end)
+    usual = np.median(some.mean(axis=2), axis=0)
+    usual = usual - usual.mean()
+    if not usual.any():
+        return []  # the far ends of the keys are outside the picture
+    likeness = []
+    for block in light.blocks(far_end):
+        level = block.mean(axis=2)
+        level = level - level.mean(axis=1, keepdims=True)
+        norm = np.linalg.norm(level, axis=1) * np.linalg.norm(usual) + 1e-9
+        likeness.append(level @ usual / norm)
+    return [
+        f"the keyboard is not where it was, or hidden, from {first:.1f} s to {end:.1f} s"
+        for first, end in intervals(np.concatenate(likeness) < _LEAST_LIKENESS)
+    ]
+
+
+def on_midi(midi: str, score: Score, offset: Offset, seconds: float) -> list[str]:
+    """Remarks on how a MIDI file fits a video.
+
+    Args:
+        midi: name of the MIDI file.
+        score: the whole MIDI file.
+        offset: where it lies in the video.
+        seconds: length of the video [s].
+    """
+    remarks = []
+    if not offset.matches:
+        remarks.append(
+            f"{midi} may not be what is played: {offset.touched:.0%} of its notes have a finger "
+            f"on their key, {offset.by_chance:.0%} would by chance"
+        )
+    begin, end = -offset.seconds, seconds - offset.seconds
+    early = int((score.onset < begin - _EARLY).sum())
+    late = int((score.onset >= end).sum())
+    if early:
+        remarks.append(f"{early} notes of the MIDI file come before the video begins")
+    if late:
+        remarks.append(f"{late} notes of the MIDI file come after the video ends")
+    if end > score.duration + _LONG_END:
+        remarks.append(
+            f"the video goes on for {end - score.duration:.1f} s after the MIDI file's last note"
+        )
+    return remarks
+
+
+def on_fingering(fingers: NoteFingers, plan: FingertipPlan) -> list[str]:
+    """Remarks on notes whose finger was guessed, and on notes that no finger plays."""
+    remarks = []
+    notes = len(plan.note_hand)
+    if fingers.guessed.any():
+        remarks.append(
+            f"{int(fingers.guessed.sum())} of {notes} notes have no finger near their key: "
+            "theirs is a guess"
+        )
+    if plan.dropped:
+        remarks.append(f"{plan.dropped} of {notes} notes are played by no finger")
+    return remarks
