@@ -1,14 +1,14 @@
 """How well experts play: learning curves, sets of songs within a time, seeds.
 
-    python benchmarks/experts.py curve SONG --steps 1000000
+    python benchmarks/experts.py curve SONG --total-steps 1000000
     python benchmarks/experts.py set FOLDER --minutes 15
     python benchmarks/experts.py seeds SONG SONG SONG --minutes 15
 
-`curve` trains the `paper` preset and prints F1 over steps. `set` trains a preset (`best` if none is
-named) on every song of a folder, one after the other, each for some minutes of all cores, and
-prints a row a song with what the zero-shot player has on it. `seeds` does that with several seeds
-and prints the spread. All go on where they were when started again: minutes that were used before
-are counted.
+`curve` trains the `paper` preset and prints F1 over control steps. `set` trains a preset (`best` if
+none is named) on every song of a folder, one after the other, each for some minutes on all cores,
+and prints for each song its F1 and that of the zero-shot player. `seeds` does that with several
+seeds and prints the spread. All resume when started again: minutes that were used before are
+counted.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ import common
 from pianomime import load_player
 from pianomime.learn.expert.config import ExpertConfig, preset_config
 from pianomime.learn.expert.expert import train_expert
-from pianomime.learn.expert.many import find_experts_songs
 from pianomime.learn.expert.expert_run import ExpertRun
+from pianomime.learn.expert.many import find_experts_songs
 from pianomime.plan.demonstration import DemonstrationPlanner
 
 
@@ -61,7 +61,7 @@ def train(song: Path, out: Path, config: ExpertConfig, seconds: float, minutes: 
 
 
 def row(song: Path, out: Path, minutes: float) -> dict[str, Any]:
-    """What came out, beside the zero-shot player on the same excerpt."""
+    """The F1 of the best expert, and of the zero-shot player on the same excerpt."""
     run = ExpertRun.load(out)
     best = run.best()[1]
     zero_shot = out.with_name(out.name + ".zero-shot")
@@ -91,7 +91,7 @@ def main() -> None:
     options.add_argument("what", choices=("curve", "set", "seeds"))
     options.add_argument("songs", nargs="+", type=Path)
     options.add_argument("--preset", default=None, help="`paper` for curves, else `best`")
-    options.add_argument("--steps", type=int, default=None, help="the preset's if not given")
+    options.add_argument("--total-steps", type=int, default=None, help="the preset's if not given")
     options.add_argument("--minutes", type=float, default=float("inf"), help="of each run")
     options.add_argument("--seconds", type=float, default=30.0, help="of each song")
     options.add_argument("--seeds", type=int, nargs="+", default=(0, 1, 2), help="for `seeds`")
@@ -104,8 +104,8 @@ def main() -> None:
     common.show_machine(facts)
     name = arguments.preset or ("paper" if arguments.what == "curve" else "best")
     config = preset_config(name)
-    if arguments.steps is not None:
-        config = replace(config, steps=arguments.steps)
+    if arguments.total_steps is not None:
+        config = replace(config, total_steps=arguments.total_steps)
     songs: list[Path] = arguments.songs
     if arguments.what == "set":
         songs = [file for folder in songs for file in find_experts_songs(folder).values()]

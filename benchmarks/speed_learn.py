@@ -1,10 +1,11 @@
-"""Steps a second of learning: the vector environment alone, and PPO end to end, beside a peer.
+"""Steps per second: the vector environment alone, and PPO end to end, beside RoboPianist.
 
-The peer is RoboPianist in Stable-Baselines3's SubprocVecEnv, in a Python of its own that
-`benchmarks/install_robopianist.py --learning` makes; without it, only ours are timed. Both are run
-in turns, several rounds, so that whatever else the machine does hits them alike; medians count.
-PPO has the network and the batch of the paper (table 6); a step is 0.05 s of playing in one
-environment. Ours is the `paper` preset with its inverse kinematics, which the peer has none of.
+RoboPianist runs in Stable-Baselines3's SubprocVecEnv, in a Python of its own that
+`benchmarks/install_robopianist.py --learning` makes; without it, only our environment is timed. The
+two are run in turns for several rounds, so that other work on the machine slows both alike, and
+medians are compared. PPO has the network and the batch of the paper (table 6); a step is 0.05 s of
+playing in one environment. Ours is the `paper` preset with its inverse kinematics, which
+RoboPianist does not compute.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 import common
 from pianomime.learn.envs.batch import SongBatch
-from pianomime.learn.envs.reference import load_song
+from pianomime.learn.envs.reference import load_demonstration
 from pianomime.learn.envs.sb3_env import Sb3Env
 from pianomime.learn.expert.config import PpoConfig, preset_config
 from pianomime.learn.expert.ppo import make_model
@@ -42,13 +43,14 @@ class Ours:
 
     def __init__(self, song: str, envs: int, steps: int, ppo: PpoConfig) -> None:
         config = replace(preset_config("paper"), ppo=ppo)
-        self._vec = Sb3Env(SongBatch(load_song(song), config.env, envs))
+        self._vec = Sb3Env(SongBatch(load_demonstration(song), config.env, envs))
         self._vec.reset()
-        draw = np.random.default_rng(0)
-        self._actions = draw.uniform(-1, 1, (steps, envs, 46)).astype(np.float32) * 0.1
+        rng = np.random.default_rng(0)
+        size = self._vec.batch.action_size
+        self._actions = rng.uniform(-1, 1, (steps, envs, size)).astype(np.float32) * 0.1
         self._model = make_model(self._vec, ppo, 0, len(common.cores()))
         self._update = ppo.steps_per_update
-        self.facts = {"observations": self._vec.batch.observer.size, "actions": 46}
+        self.facts = {"observations": self._vec.batch.observer.size, "actions": size}
 
     def rate(self, mode: str) -> float:
         """Steps a second in a mode."""
@@ -81,7 +83,7 @@ def main() -> None:
     arguments = options.parse_args()
     facts = common.machine()
     common.show_machine(facts)
-    ppo = PpoConfig(envs=arguments.envs, steps_per_update=arguments.update)
+    ppo = PpoConfig(num_envs=arguments.envs, steps_per_update=arguments.update)
     sides: dict[str, Ours | Peer] = {
         "ours": Ours(arguments.song, arguments.envs, arguments.steps, ppo)
     }
@@ -91,7 +93,7 @@ def main() -> None:
             arguments.envs,
             arguments.steps,
             ppo.steps_per_update,
-            ppo.batch,
+            ppo.batch_size,
             len(common.cores()),
         )
     else:

@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 import tyro
 
 from pianomime.commands.extras import extra
-from pianomime.commands.named import named
+from pianomime.commands.named import option_value
+from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.learn.expert.config import ExpertConfig, preset_config
 
 PresetName = Literal["paper", "best"]
@@ -19,34 +20,37 @@ PresetName = Literal["paper", "best"]
 class TrainExpert:
     """Train an expert of one song, on a human's demonstration or on the zero-shot plan.
 
-    RUN then holds the expert, its learning curve (curve.json, tensorboard/) and all that is needed
-    to go on: a run that was interrupted goes on where it was when it is started again with the same
-    RUN, and one that is finished goes on with more --steps.
+    RUN then holds the expert, its learning curve (curve.json, tensorboard/) and the checkpoint.
+    Started again with the same RUN, an interrupted run resumes from its checkpoint, and a finished
+    one goes on if --total-steps is larger.
 
     Examples:
       pianomime train-expert DEMO.npz
       pianomime train-expert SONG.mid --preset best -o runs/song
-      pianomime train-expert DEMO.npz --steps 5000000 --ppo.learning-rate 1e-4
+      pianomime train-expert DEMO.npz --total-steps 5000000 --ppo.learning-rate 1e-4
       pianomime play SONG.mid --player runs/song
     """
 
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
     """A demonstration (see `pianomime retarget`), a MIDI file, or the name of a bundled song."""
     preset: PresetName = "paper"
-    """The paper's residual policy, or what plays best; settings below change it."""
+    """The paper's residual policy, or the trajectory search, which plays best; the settings below
+    change it."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="RUN")] = None
     """Folder of the run; out/expert-SONG-PRESET if not given."""
-    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
-    """How much to play at most, from what sounds at START or first after it [s]."""
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
+    """Longest excerpt, from the first note that sounds at START or after it [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in the song to begin [s]."""
     config: Annotated[ExpertConfig, tyro.conf.arg(name="")] = field(default_factory=ExpertConfig)
-    """Everything else."""
+    """All other settings."""
 
     @classmethod
     def default(cls, arguments: list[str]) -> TrainExpert:
-        """What holds for arguments that are not given: that is for the preset to say."""
-        return cls(song=tyro.MISSING, config=preset_config(named("--preset", arguments, "paper")))
+        """The defaults, which depend on the preset."""
+        return cls(
+            song=tyro.MISSING, config=preset_config(option_value("--preset", arguments, "paper"))
+        )
 
     def run(self) -> None:
         """Train.
@@ -62,12 +66,7 @@ class TrainExpert:
         out = self.out or Path("out", f"expert-{Path(self.song).stem}-{self.preset}")
         with bars() as progress, extra("train"):
             run = train_expert(
-                self.song,
-                out,
-                self.config,
-                self.start,
-                self.seconds,
-                progress=progress,
+                self.song, out, self.config, self.start, self.seconds, progress=progress
             )
         best = run.best()[1]
         print(f"F1 {best['f1']:.3f} after {best['steps']} steps")

@@ -9,8 +9,9 @@ from typing import Annotated
 import tyro
 
 from pianomime.commands.extras import extra
-from pianomime.commands.named import named
+from pianomime.commands.named import option_value
 from pianomime.commands.train_expert import PresetName
+from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.learn.expert.config import ExpertConfig, preset_config
 
 
@@ -18,9 +19,9 @@ from pianomime.learn.expert.config import ExpertConfig, preset_config
 class TrainExperts:
     """Train an expert of every demonstration and MIDI file in a folder; print a Markdown table.
 
-    OUT then holds a run for each song, the table (experts.md, experts.json) and a picture of all
-    F1, sorted (experts.png). Started again with the same OUT it goes on where it was. A song that
-    fails is a line of the table.
+    OUT then holds a run for each song, the table (experts.md, experts.json) and a bar chart of the
+    F1 (experts.png). Started again with the same OUT, interrupted runs resume and finished ones are
+    kept. A song that fails is a line of the table.
 
     Examples:
       pianomime train-experts FOLDER
@@ -29,27 +30,31 @@ class TrainExperts:
     """
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
-    """Of songs, also further down."""
+    """Folder of songs, which is searched with all folders below it."""
     preset: PresetName = "paper"
-    """The paper's residual policy, or what plays best; settings below change it."""
+    """The paper's residual policy, or the trajectory search, which plays best; the settings below
+    change it."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the results; out/experts-FOLDER-PRESET if not given."""
-    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 30.0
-    """How much of each song to play at most [s]."""
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
+    """Longest excerpt of each song [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in each song to begin [s]."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Songs at the same time; one a core if not given. A cluster decides for itself."""
+    """Songs that are trained at the same time; one for each core if not given. A Ray cluster
+    decides by itself."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
-    """A Ray cluster to train on, all of whose nodes see FOLDER and OUT; `auto` for the one that
-    this machine is part of, `local` for one on this machine."""
+    """Address of a Ray cluster to train on, all of whose nodes see FOLDER and OUT; `auto` for the
+    cluster that this machine is part of, `local` for a new one on this machine."""
     config: Annotated[ExpertConfig, tyro.conf.arg(name="")] = field(default_factory=ExpertConfig)
-    """Everything else."""
+    """All other settings."""
 
     @classmethod
     def default(cls, arguments: list[str]) -> TrainExperts:
-        """What holds for arguments that are not given: that is for the preset to say."""
-        return cls(folder=tyro.MISSING, config=preset_config(named("--preset", arguments, "paper")))
+        """The defaults, which depend on the preset."""
+        return cls(
+            folder=tyro.MISSING, config=preset_config(option_value("--preset", arguments, "paper"))
+        )
 
     def run(self) -> None:
         """Train and print.

@@ -75,7 +75,8 @@ def load_expert_player(effort: int, seed: int, run: str | Path = "") -> Player:
     """The player `expert`, for `pianomime.load_player`.
 
     Args:
-        effort, seed: of no meaning for an expert, which plays as it was trained to.
+        effort: of no meaning for an expert, which plays as it was trained to.
+        seed: of no meaning either.
         run: folder of its run.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Experts of many songs: a process a song on this machine, or a task a song on a Ray cluster."""
+"""Experts of many songs: one process per song on this machine, or one task on a Ray cluster."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ def train_experts(
 ) -> list[Row]:
     """Train an expert of every demonstration and MIDI file in a folder.
 
-    Each song's run is a folder in `out`; one that was interrupted goes on where it was, and one
-    that is finished is not trained again. A song that fails is a row with an `error`.
+    Each song has a run folder in `out`. Interrupted runs resume, and finished ones are kept. A song
+    that fails is a row with an `error`.
 
     Args:
-        folder: of songs, also further down.
-        out: for the runs, and for `experts.json`, `experts.md` and `experts.png`.
-        config: how.
+        folder: is searched for songs, with all folders below it.
+        out: folder for the runs, and for `experts.json`, `experts.md` and `experts.png`.
+        config: how the experts are made.
         start: where the excerpt of each begins [s].
         seconds: its length at most [s].
-        jobs: songs at the same time on this machine; one a core if None.
+        jobs: songs trained at the same time on this machine; one for each core if None.
         ray: address of a Ray cluster whose nodes all see both folders; "local" starts one here.
         progress: told the songs done, the songs in all and their mean F1 so far.
 
