@@ -28,6 +28,7 @@ import common
 from pianomime.keyboard import KEYS
 from pianomime.music import FrameMetrics, frame_metrics
 from pianomime.plan import FingertipPlan
+from pianomime.players import rollout
 from pianomime.track import IkTracker
 from pianomime.world import PhysicsWarning, World
 from pianomime.world.hand import Hand
@@ -144,12 +145,10 @@ def ik_alone(shared: Path) -> FrameMetrics:
         fingertips, finger_key, goal = (file[k] for k in ("fingertips", "finger_key", "goal"))
     none = np.empty(0, np.int8)
     plan = FingertipPlan(fingertips, finger_key, note_hand=none, note_finger=none)
-    tracker, world = IkTracker(), World()
-    tracker.begin(plan)
+    world = World()
     pressed = np.empty_like(goal)
-    for frame in range(len(plan)):
-        world.step(tracker.control(frame, world))
-        pressed[frame] = world.pressed
+    for step in rollout(IkTracker().start(plan), world, np.zeros(len(plan), bool)):
+        pressed[step.frame] = world.pressed
     return frame_metrics(goal, pressed)
 
 

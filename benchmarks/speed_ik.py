@@ -29,12 +29,12 @@ def measure(tracker: Tracker, plan: FingertipPlan) -> dict[str, float]:
     """Milliseconds a frame of one tracker."""
     world = World()
     start = time.perf_counter()
-    tracker.begin(plan)
+    controller = tracker.start(plan)
     begin = time.perf_counter() - start
     control = np.empty(len(plan))
     for frame in range(len(plan)):
         start = time.perf_counter()
-        ctrl = tracker.control(frame, world)
+        ctrl = controller.control(frame, world)
         control[frame] = time.perf_counter() - start
         world.step(ctrl)
     each = begin / len(plan) + control.mean()

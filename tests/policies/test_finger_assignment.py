@@ -5,8 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pianomime.keyboard import KEYS, NO_KEY
-from pianomime.policies.features import rest_tips
-from pianomime.policies.finger_assignment import HIGH, assign_fingers
+from pianomime.policies.features import rest_points
+from pianomime.policies.finger_assignment import HOVER_HEIGHT, assign_fingers
 from pianomime.world.parameters import key_centres, key_half_sizes
 
 NOTHING = np.full((2, 5), NO_KEY, np.int8)
@@ -19,7 +19,7 @@ def goal_of(*keys):
 
 
 def over(hand, finger, key):
-    tips = rest_tips().copy()
+    tips = rest_points().copy()
     tips[hand, finger + 1] = [0.04, key_centres()[key, 1] + 0.004, 0.0]
     return tips
 
@@ -29,7 +29,7 @@ def test_the_nearest_finger_is_put_on_its_key():
     assert keys[1, 2] == 44
     assert (keys != NO_KEY).sum() == 1
     np.testing.assert_allclose(tips[1, 3], [0.04, key_centres()[44, 1], 0.0])
-    assert (np.delete(tips[..., 2].ravel(), 9) == HIGH).all()
+    assert (np.delete(tips[..., 2].ravel(), 9) == HOVER_HEIGHT).all()
 
 
 def test_a_finger_that_holds_a_key_goes_on_even_if_another_is_nearer():
@@ -40,9 +40,9 @@ def test_a_finger_that_holds_a_key_goes_on_even_if_another_is_nearer():
 
 
 def test_a_key_out_of_reach_of_all_is_left_out():
-    tips, keys = assign_fingers(rest_tips().copy(), goal_of(87), NOTHING)
+    tips, keys = assign_fingers(rest_points().copy(), goal_of(87), NOTHING)
     assert (keys == NO_KEY).all()
-    np.testing.assert_array_equal(tips[..., :2], rest_tips()[..., :2])
+    np.testing.assert_array_equal(tips[..., :2], rest_points()[..., :2])
 
 
 def test_on_black_keys_and_beyond_the_edge_fingers_stay_on_the_key():
@@ -63,7 +63,7 @@ def test_on_black_keys_and_beyond_the_edge_fingers_stay_on_the_key():
 )
 def test_whatever_comes_each_key_has_one_finger_and_each_finger_one_key(keys, before, seed):
     draw = np.random.default_rng(seed)
-    tips = rest_tips() + draw.normal(0, 0.1, (2, 6, 3))
+    tips = rest_points() + draw.normal(0, 0.1, (2, 6, 3))
     held = np.array(before, np.int8)
     for key in set(before) - {-1}:  # no key was held twice
         held[np.flatnonzero(held == key)[1:]] = NO_KEY

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pianomime.policies.sampler import Sampler, ddim_sample, signal
+from pianomime.policies.sampler import Sampler, alphas_cumprod, ddim_sample
 
 diffusers = pytest.importorskip("diffusers", reason="needs the extra train")
 torch = pytest.importorskip("torch")
@@ -50,7 +50,7 @@ def test_it_is_what_diffusers_does(prediction, steps, eta):
 
 def test_the_schedule_is_that_of_training():
     schedule = diffusers.DDPMScheduler(STEPS, beta_schedule="squaredcos_cap_v2")
-    np.testing.assert_allclose(signal(STEPS), schedule.alphas_cumprod.numpy(), rtol=1e-4)
+    np.testing.assert_allclose(alphas_cumprod(STEPS), schedule.alphas_cumprod.numpy(), rtol=1e-4)
 
 
 def test_a_network_that_knows_the_answer_is_believed():

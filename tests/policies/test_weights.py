@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pianomime import Player, Score, excerpt, songs
+from pianomime import Score, excerpt, load_player, songs
 from pianomime.policies.methods import WEIGHTS, weights_folder
 
 
@@ -35,7 +35,7 @@ def test_fingers_add_something() -> None:
         for name in ("beethoven-ode-to-joy", "petzold-minuet-g", "satie-gymnopedie-1")
     ]
     with_it, without = (
-        np.mean([Player.from_name(name, 0).play(one).metrics()["f1"] for one in some])
+        np.mean([load_player(name, 0).play(one).metrics()["f1"] for one in some])
         for name in ("fingers", "zero-shot")
     )
     assert with_it > without
@@ -45,11 +45,11 @@ def test_fingers_add_something() -> None:
     ("name", "least"), [("fingers", 0.85), ("two-stage-diff", 0.3), ("two-stage-mse", 0.3)]
 )
 def test_they_play(score: Score, name: str, least: float) -> None:
-    first, again = (Player.from_name(name, 0).play(score) for _ in range(2))
+    first, again = (load_player(name, 0).play(score) for _ in range(2))
     assert first.metrics()["f1"] > least
     np.testing.assert_array_equal(first.ctrl, again.ctrl)
 
 
 def test_another_seed_draws_otherwise(score: Score) -> None:
-    first, other = (Player.from_name("two-stage-diff", 0, seed).play(score) for seed in (0, 1))
+    first, other = (load_player("two-stage-diff", 0, seed).play(score) for seed in (0, 1))
     assert not np.array_equal(first.ctrl, other.ctrl)

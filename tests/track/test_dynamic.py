@@ -13,6 +13,7 @@ from pianomime.keyboard import FRAME_SECONDS, NO_KEY
 from pianomime.music import Score, frame_metrics
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.plan.joint_path import HOME
+from pianomime.players import rollout
 from pianomime.songs.find import find_song
 from pianomime.track import DynamicTracker, IkTracker, Tracker
 from pianomime.track.dynamic import motion_torque, press_torque, to_actuators
@@ -53,10 +54,8 @@ def plan_of(paths: list[NDArray[np.float64]]) -> FingertipPlan:
 def follow(tracker: Tracker, plan: FingertipPlan) -> tuple[NDArray[np.float64], World]:
     """(T, 2, 5) [m] distances of the fingertips from the plan, and the World at the end."""
     world = World()
-    tracker.begin(plan)
     away = np.empty((len(plan), 2, 5))
-    for frame in range(len(plan)):
-        world.step(tracker.control(frame, world))
+    for frame, *_ in rollout(tracker.start(plan), world, np.zeros(len(plan), bool)):
         away[frame] = np.linalg.norm((world.fingertips - plan.fingertips[frame])[:, 1:], axis=2)
     return away, world
 
@@ -145,12 +144,10 @@ def test_a_tracker_can_be_used_again() -> None:
 def test_plays_an_easy_song() -> None:
     score = Score.from_midi(find_song("beethoven-ode-to-joy")).clip(0.0, 5.0)
     plan = ZeroShotPlanner().plan(score)
-    tracker, world = DynamicTracker(), World()
-    tracker.begin(plan)
+    world = World()
     pressed = np.empty_like(score.roll())
-    for frame in range(len(plan)):
-        world.step(tracker.control(frame, world))
-        pressed[frame] = world.pressed
+    for step in rollout(DynamicTracker().start(plan), world, score.pedal_roll()):
+        pressed[step.frame] = world.pressed
     assert frame_metrics(score.roll(), pressed).f1 > 0.85
 
 

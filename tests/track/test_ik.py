@@ -14,6 +14,7 @@ from scipy.optimize import lsq_linear
 
 from pianomime.music import frame_metrics
 from pianomime.plan import FingertipPlan
+from pianomime.players import rollout
 from pianomime.track import IkConfig, IkTracker
 from pianomime.track.ik import bounded_least_squares
 from pianomime.world import World
@@ -154,8 +155,8 @@ def test_controls_are_the_next_joint_positions() -> None:
     tracker, world = IkTracker(), World()
     fingertips = world.fingertips[None] + [0.0, 0.0, -0.01]
     none = np.empty(0, np.int8)
-    tracker.begin(FingertipPlan(fingertips, np.full((1, 2, 5), -1, np.int8), none, none))
-    ctrl = tracker.control(0, world)
+    idle = np.full((1, 2, 5), -1, np.int8)
+    ctrl = tracker.start(FingertipPlan(fingertips, idle, none, none)).control(0, world)
     assert ctrl.shape == (46,)
     for hand, target in zip(HANDS.values(), fingertips[0], strict=True):
         there = tracker.step(hand, world.qpos[hand.joints], target)
@@ -167,12 +168,11 @@ def test_plays_stan_as_published(shared: Path) -> None:
     with np.load(shared / "data" / "stan" / "reference.npz") as file:
         fingertips, finger_key, goal = (file[k] for k in ("fingertips", "finger_key", "goal"))
     none = np.empty(0, np.int8)
-    tracker, world = IkTracker(), World()
-    tracker.begin(FingertipPlan(fingertips, finger_key, none, none))
+    world = World()
+    controller = IkTracker().start(FingertipPlan(fingertips, finger_key, none, none))
     pressed = np.empty_like(goal)
-    for frame in range(len(goal)):
-        world.step(tracker.control(frame, world))
-        pressed[frame] = world.pressed
+    for step in rollout(controller, world, np.zeros(len(goal), bool)):
+        pressed[step.frame] = world.pressed
     played = frame_metrics(goal, pressed)
     assert played.precision == pytest.approx(0.80, abs=0.03)
     assert played.recall == pytest.approx(0.68, abs=0.03)

@@ -50,10 +50,9 @@ def moved(score, keys):
 
 
 def test_who_adds_nothing_plays_as_the_dynamic_tracker_does(two_notes):
-    plain, added = DynamicTracker(), FingerResidualTracker(silent)
+    trackers = DynamicTracker(), FingerResidualTracker(silent)
+    plain, added = (tracker.start(two_notes.plan) for tracker in trackers)
     world = World()
-    for tracker in (plain, added):
-        tracker.begin(two_notes.plan)
     for frame in range(12):
         ctrl = plain.control(frame, world)
         np.testing.assert_array_equal(added.control(frame, world), ctrl)
@@ -61,10 +60,10 @@ def test_who_adds_nothing_plays_as_the_dynamic_tracker_does(two_notes):
 
 
 class _Aiming:
-    """A tracker that aims at these points, along these joints."""
+    """A controller of a plan that aims at these points, along these joints."""
 
-    def __init__(self, aim, path):
-        self._aim, self._path = aim, path
+    def __init__(self, plan, aim, path):
+        self.plan, self._aim, self._path = plan, aim, path
 
     def aim(self, frame):
         return self._aim, self._path
@@ -92,11 +91,14 @@ def test_left_fingers_are_told_what_right_ones_are_in_a_mirror(two_notes):
     state[: 2 * 41 + 1] = draw.random(2 * 41 + 1)
     state[: 2 * 41 + 1] = np.maximum(state[: 2 * 41 + 1], state[2 * 41 :: -1])
     around = FingerObservation(
-        FingertipPlan(plan.fingertips, keys, plan.note_hand, plan.note_finger),
-        _Aiming(both(aim), np.array([path * mirror, path])),
+        _Aiming(
+            FingertipPlan(plan.fingertips, keys, plan.note_hand, plan.note_finger),
+            both(aim),
+            np.array([path * mirror, path]),
+        )
     )
     qpos, qvel = (np.r_[right, right * mirror] for right in (pose, velocity))
-    told = around.look(8, np.r_[np.zeros(88), qpos], qvel, state, both(points))
+    told = around.encode(8, np.r_[np.zeros(88), qpos], qvel, state, both(points))
     left, right = told.reshape(2, 5, SIZE)
     np.testing.assert_allclose(left, right, atol=1e-4)
     assert (np.ptp(right, axis=0) > 0).sum() > 30

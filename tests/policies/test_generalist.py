@@ -1,0 +1,133 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pianomime import load_player
+from pianomime.errors import InputError
+from pianomime.music import Score
+from pianomime.plan import ZeroShotPlanner
+from pianomime.players import rollout
+from pianomime.players.generalist import GeneralistPlayer
+from pianomime.policies.features import action_reference, relative_to_wrist, to_world_frame
+from pianomime.policies.fingertip_policy import LearnedPlanner
+from pianomime.policies.methods import METHODS, WEIGHTS
+from pianomime.policies.policy_tracker import PolicyTracker
+from pianomime.world import World
+from pianomime.world.parameters import key_centres
+
+SCORE = Score([44, 25], [0.2, 0.4], [0.6, 0.8], [80, 80], pedal=np.zeros((0, 2)), title="two")
+
+
+class Still:
+    """A policy that keeps everything where it is, and its observations."""
+
+    def __init__(self, level):
+        self.level, self.observations = level, []
+
+    def act(self, observation, rng):
+        self.observations.append(observation)
+        if self.level == "high":
+            return np.repeat(observation["vector"][:, None], 4, axis=1)
+        return np.repeat(action_reference(self.level, False, observation["vector"]), 4, axis=1)
+
+
+class Pointing(Still):
+    """Puts a finger near whatever is due."""
+
+    def act(self, observation, rng):
+        action = super().act(observation, rng).reshape(1, 4, 2, 6, 3)
+        for key in np.flatnonzero(observation["goal"][0, 0]):
+            hand = action[:, :, int(key > 40)]
+            hand[..., 2, 1] = key_centres()[key, 1] + 0.005 - hand[..., 0, 1]
+        return action.reshape(1, 4, 36)
+
+
+def play(low, high=None):
+    tracker = PolicyTracker(low, fingertips=high is not None)
+    return GeneralistPlayer("made up", tracker, high).play(SCORE)
+
+
+def test_the_plan_that_is_kept_is_what_was_wanted_on_the_way():
+    high, low = Pointing("high"), Still("low")
+    performance = play(low, high)
+    plan = performance.plan
+    np.testing.assert_array_equal(plan.keys(), SCORE.roll())
+    assert plan.note_hand.tolist() == [1, 0]
+    assert plan.note_finger.tolist() == [1, 1]
+    frame, hand, finger = np.nonzero(plan.finger_key >= 0)
+    key = plan.finger_key[frame, hand, finger]
+    np.testing.assert_allclose(plan.fingertips[frame, hand, finger + 1, 1], key_centres()[key, 1])
+    # The low level saw the same, for as far as it looks ahead.
+    shown = low.observations[4]["frames"][0, 0, :36].reshape(2, 6, 3)
+    np.testing.assert_allclose(shown, plan.fingertips[4], atol=1e-6)
+
+
+def test_goals_ahead_end_in_silence():
+    high = Pointing("high")
+    performance = play(Still("low"), high)
+    roll = SCORE.roll()
+    assert len(high.observations) == len(roll) == len(performance.plan)
+    np.testing.assert_array_equal(high.observations[2]["goal"][0], roll[2:12].astype(float))
+    assert not high.observations[-1]["goal"][0, 1:].any()
+
+
+def test_a_policy_of_one_stage_plays_without_a_plan():
+    low = Still("whole")
+    performance = play(low)
+    assert low.observations[0]["frames"].shape == (1, 4, 0)
+    assert np.isfinite(performance.plan.fingertips).all()
+    assert len(performance.plan) == SCORE.frames()
+
+
+def test_the_same_seed_plays_the_same():
+    first, again = (play(Still("low"), Pointing("high")) for _ in range(2))
+    np.testing.assert_array_equal(first.ctrl, again.ctrl)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_without_weights_there_is_one_clear_line(method, tmp_path, monkeypatch):
+    monkeypatch.setenv(WEIGHTS, str(tmp_path))
+    with pytest.raises(InputError, match="pianomime train") as error:
+        load_player(method)
+    assert "\n" not in str(error.value)
+
+
+def test_a_policy_controller_asked_twice_answers_the_same():
+    """So predictive sampling can improve it."""
+
+    class Sampling(Still):
+        def act(self, observation, rng):
+            return super().act(observation, rng) + rng.normal(0, 0.1, (1, 4, 46))
+
+    controller = PolicyTracker(Sampling("low")).start(ZeroShotPlanner().plan(SCORE))
+    world = World()
+    assert controller.replayable
+    first = controller.control(3, world)
+    controller.control(4, world)
+    np.testing.assert_array_equal(controller.control(3, world), first)
+
+
+def test_a_plan_that_somebody_holds_does_not_grow():
+    player = GeneralistPlayer("made up", PolicyTracker(Still("low")), Pointing("high"))
+    controller, world = player.start(SCORE), World()
+    early = controller.plan
+    kept = early.finger_key.copy()
+    for _ in rollout(controller, world, SCORE.pedal_roll()):
+        pass
+    np.testing.assert_array_equal(early.finger_key, kept)
+    assert (controller.plan.finger_key >= 0).any()
+
+
+def test_what_is_told_from_wrists_is_taken_back():
+    points = np.random.default_rng(0).normal(size=(7, 2, 6, 3))
+    np.testing.assert_allclose(to_world_frame(relative_to_wrist(points)), points)
+    moved = relative_to_wrist(points + [0.0, 0.3, 0.0])
+    np.testing.assert_allclose(moved[:, :, 1:], relative_to_wrist(points)[:, :, 1:])
+
+
+def test_a_song_that_is_planned_ahead_is_what_would_be_wanted_on_the_way():
+    ahead = LearnedPlanner(Pointing("high")).plan(SCORE)
+    way = play(Still("low"), Pointing("high")).plan
+    for name in ("fingertips", "finger_key", "note_hand", "note_finger"):
+        np.testing.assert_array_equal(getattr(ahead, name), getattr(way, name))
