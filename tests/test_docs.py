@@ -187,3 +187,25 @@ def test_the_reference_names_everything_in_results() -> None:
     row = results["songs"][0]
     shown = section("file-formats.md", "report.json")
     assert set(re.findall(r"`(\w+)`", shown)) == set(row) - {"causes"}
+
+
+def argument_docs(owner: Any, name: str) -> str:
+    """What a method, or one that it overrides, says of its arguments."""
+    return "".join(inspect.getdoc(vars(base).get(name)) or "" for base in owner.__mro__)
+
+
+def test_public_functions_say_what_their_arguments_are() -> None:
+    silent = []
+    for name in pianomime.__all__:
+        found = getattr(pianomime, name)
+        if inspect.isfunction(found) and inspect.signature(found).parameters:
+            silent += [name] * ("Args:" not in (inspect.getdoc(found) or ""))
+        if not inspect.isclass(found):
+            continue
+        for method, function in inspect.getmembers(found, inspect.isroutine):
+            if method.startswith("_") or not hasattr(function, "__code__"):
+                continue
+            arguments = {*inspect.signature(function).parameters} - {"self"}
+            if arguments and "Args:" not in argument_docs(found, method):
+                silent.append(f"{name}.{method}")
+    assert silent == []
