@@ -66,10 +66,10 @@ def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> 
     assert "No such file" in fails(["train-expert", "nothing.npz"], capsys)
     assert "a second" in fails(["train-expert", "demo.npz", "--seconds", "0.2"], capsys)
     Path("other").mkdir()
-    assert "not the folder of a run" in fails(["play", "demo.npz", "--player", "other"], capsys)
+    assert "neither the folder of a run" in fails(["play", "demo.npz", "--player", "other"], capsys)
     main(["train-expert", "demo.npz", "--method", "search", "-o", "run", *QUICK])
     capsys.readouterr()
-    assert "--start: an expert" in fails(
+    assert "--start: run plays the excerpt" in fails(
         ["play", "demo.npz", "--player", "run", "--start", "1"], capsys
     )
     assert "not the score" in fails(["play", "ode-to-joy", "--player", "run", "--no-video"], capsys)
