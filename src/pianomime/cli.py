@@ -15,8 +15,9 @@ import io
 import os
 import re
 import sys
+import typing
 import warnings
-from typing import NamedTuple, NoReturn, Protocol
+from typing import Any, NamedTuple, NoReturn, Protocol
 
 from pianomime import __version__
 from pianomime.errors import InputError, WorkFailed
@@ -188,7 +189,10 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
         if refused is not None:
             raise refused from None
         raise InputError(f"{_gist(said.getvalue())} (see pianomime {name} --help)") from None
-    return command if settings is None else dataclasses.replace(command, settings=settings)
+    if settings is None:
+        return command
+    with_settings: Runnable = dataclasses.replace(typing.cast(Any, command), settings=settings)
+    return with_settings
 
 
 def _refused_by_config(stopped: BaseException) -> InputError | None:

@@ -34,9 +34,9 @@ def rollout(controller: Controller, world: World, pedal: NDArray[np.bool_]) -> I
         world: where it is played, in the state before the first frame.
         pedal: (T,) bool, the pedal of the score in every frame.
     """
-    works_pedal = isinstance(controller, PedalController)
+    pedalling = controller if isinstance(controller, PedalController) else None
     for frame in range(len(pedal)):
         ctrl = controller.control(frame, world)
-        down = controller.pedal(frame) if works_pedal else bool(pedal[frame])
+        down = bool(pedal[frame]) if pedalling is None else pedalling.pedal(frame)
         world.step(ctrl, down)
         yield Step(frame, ctrl, down)
