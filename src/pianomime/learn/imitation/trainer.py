@@ -31,7 +31,7 @@ from pianomime.learn.imitation.trainer_config import MAY_DIFFER, TrainerConfig
 from pianomime.learn.runs.log import RunLog
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.safetensors_file import Arrays
-from pianomime.learn.runs.torch_threads import torch_threads
+from pianomime.learn.torch_threads import torch_threads
 from pianomime.progress import Progress, no_progress
 
 Batch = dict[str, Tensor]

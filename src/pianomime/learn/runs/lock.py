@@ -1,4 +1,4 @@
-"""One process at a time trains in a run's folder."""
+"""A lock on the folder of a run, so that one process at a time trains in it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from pathlib import Path
 from pianomime.errors import InputError
 
 _PATIENCE = 10.0
-"""[s] A process that was told to end, or whose node is lost, needs a moment to be gone."""
+"""[s] for a process that was stopped, or whose node is lost, to be gone."""
 _PAUSE = 0.1
+"""[s] between tries."""
 
 
 @contextlib.contextmanager

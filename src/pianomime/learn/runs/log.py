@@ -1,4 +1,4 @@
-"""Figures of a training, for TensorBoard."""
+"""Metrics of a training, for TensorBoard."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tensorboard.summary.writer.event_file_writer import EventFileWriter
 
 
 class RunLog:
-    """Writes figures as they come, without torch.
+    """Writes metrics as they come, without torch.
 
     Args:
         folder: of the logs.
-        since: the step that comes next. What a process that was killed wrote of that and later
-            ones is not shown any more.
+        since: the next step. Metrics that a killed process wrote for it and later steps are not
+            shown any more.
     """
 
     def __init__(self, folder: Path, since: int = 0) -> None:
@@ -25,9 +25,9 @@ class RunLog:
         begin = SessionLog(status=SessionLog.START)
         self._writer.add_event(Event(wall_time=time.time(), step=since, session_log=begin))
 
-    def add(self, step: int, figures: Mapping[str, float]) -> None:
-        """Write figures, each with its name, at a step."""
-        scalars = [Summary.Value(tag=name, simple_value=figure) for name, figure in figures.items()]
+    def add(self, step: int, metrics: Mapping[str, float]) -> None:
+        """Write the metrics of a step, by name."""
+        scalars = [Summary.Value(tag=name, simple_value=value) for name, value in metrics.items()]
         self._writer.add_event(
             Event(wall_time=time.time(), step=step, summary=Summary(value=scalars))
         )

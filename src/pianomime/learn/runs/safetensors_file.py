@@ -1,4 +1,4 @@
-"""Named arrays and a little text in one safetensors file; nothing in it is ever executed."""
+"""Named arrays and metadata in one safetensors file, from which no code is ever executed."""
 
 from __future__ import annotations
 
@@ -15,35 +15,39 @@ from pianomime.errors import InputError
 from pianomime.files import atomic
 
 Arrays = dict[str, NDArray[Any]]
+"""Arrays by name."""
+
+_METADATA = "about"
+"""Key of the metadata in the file's header."""
 
 
-def write_tensors(path: Path, arrays: Arrays, about: dict[str, Any]) -> None:
+def write_tensors(path: Path, arrays: Arrays, metadata: dict[str, Any]) -> None:
     """Write a file, whole or not at all.
 
     Args:
-        path: where to.
-        arrays: what to.
-        about: anything that JSON can hold.
+        path: of the file; its folder must exist.
+        arrays: by name.
+        metadata: anything that JSON can hold.
 
     Raises:
         OSError: the disk is full, or the folder cannot be written; what was there stays.
     """
     plain = {name: np.asarray(array, order="C") for name, array in arrays.items()}
-    content = save(plain, {"about": json.dumps(about)})
+    content = save(plain, {_METADATA: json.dumps(metadata)})
     with atomic(path) as temporary:
         temporary.write_bytes(content)
 
 
 def read_tensors(path: Path) -> tuple[Arrays, dict[str, Any]]:
-    """What `write_tensors` wrote.
+    """The arrays and the metadata that `write_tensors` wrote.
 
     Raises:
         InputError: there is no such file, or it is another or a damaged one.
     """
     try:
         with safetensors.safe_open(path, framework="numpy") as file:
-            about = json.loads(file.metadata()["about"])
-            return {name: file.get_tensor(name) for name in file.keys()}, about  # noqa: SIM118
+            metadata = json.loads(file.metadata()[_METADATA])
+            return {name: file.get_tensor(name) for name in file.keys()}, metadata  # noqa: SIM118
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist") from None
     except (safetensors.SafetensorError, KeyError, TypeError, ValueError, OSError) as error:
