@@ -16,8 +16,11 @@ from pianomime.keyboard import EXCERPT_SECONDS
 class Evaluate:
     """Play and score many songs in parallel; print a Markdown table.
 
-    OUT then holds results.json and results.md. A run that was interrupted goes on where it was
-    when it is started again with the same OUT. A song that fails is a line of the table.
+    OUT then holds results.json and results.md. An evaluation that was interrupted resumes where it
+    was when it is started again with the same OUT. A song that fails is a line of the table.
+
+    Settings of the player are options too, such as --planner.beam 200: `pianomime players
+    zero-shot` lists those of the zero-shot player.
 
     Examples:
       pianomime evaluate FOLDER

@@ -22,8 +22,11 @@ if TYPE_CHECKING:
 class Play:
     """Play a song with two simulated hands, and report on it.
 
-    OUT then holds a page to look at and listen to (report.html), the numbers (report.json), the
-    performance itself (performance.npz) and as MIDI, WAV, picture and film.
+    OUT then holds a page to look at and listen to (report.html), the metrics (report.json), the
+    performance as arrays (performance.npz), and MIDI, WAV, pictures and a film of it.
+
+    Settings of the player are options too, such as --planner.beam 200: `pianomime players
+    zero-shot` lists those of the zero-shot player.
 
     Examples:
       pianomime play ode-to-joy
