@@ -49,7 +49,7 @@ class PpoConfig:
     target_kl: float = 0.0
     """KL divergence at which the passes of an update end early; 0 for no limit."""
     initial_std: float = 0.3
-    """Standard deviation of the actions at the start; table 6 does not tell it."""
+    """Standard deviation of the actions at the start; table 6 does not give it."""
     evaluate_every: int = 1
     """Number of updates between evaluations."""
 

@@ -91,8 +91,8 @@ def find_experts_songs(folder: Path, out: Path | None = None) -> dict[str, Path]
     """Demonstrations and MIDI files of a folder by the names of their runs, in order.
 
     Args:
-        folder: of songs; what runs in it keep for themselves is left out.
-        out: where results are, which are left out too.
+        folder: is searched with all folders below it, except for run folders.
+        out: folder of the results, which is left out as well.
 
     Raises:
         InputError: there is no such folder, nothing in it, or it is `out`.

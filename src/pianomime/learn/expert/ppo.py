@@ -3,7 +3,7 @@
 A run can be stopped at any instant and resumes to the same learning curve. That takes two things.
 All random numbers of an update come from generators that are seeded by the run's seed and the
 number of the update. And between updates the worlds are set to the state that a checkpoint of them
-holds, whether or not one is ever read: MuJoCo's state does not tell which keys sleep, so a world
+holds, whether or not one is ever read: MuJoCo's state does not include which keys sleep, so a world
 that was read from a checkpoint would otherwise differ in the last digits from one that went on.
 """
 

@@ -22,7 +22,7 @@ def on_cluster(
 ) -> Generator[tuple[str, Row], None, None]:
     """Rows in the order in which they are done.
 
-    A song whose node dies is begun again on another node, and goes on where its run was: all
+    A song whose node dies is started again on another node and resumes from its checkpoint, so all
     nodes must see the folders of songs and runs.
 
     Args:
