@@ -12,67 +12,69 @@ import tyro
 from pianomime.learn.data.dagger_config import DaggerConfig
 
 if TYPE_CHECKING:
-    from pianomime.commands.progress import Tell
     from pianomime.learn.data.episode import Episode
+    from pianomime.progress import Progress
 
 
 @dataclass(frozen=True)
 class CollectDagger:
-    """Make a data set for imitation by asking a teacher, the dynamic tracker on human fingertips.
+    """Make a data set for imitation by DAgger, with the dynamic tracker as the expert.
 
-    Demonstrations are played with noise on the controls, by the teacher or by a low level that was
-    trained before (--pilot), and the teacher's controls in every moment are written down: so who
-    learns from them also learns to come back. With --planner a high level that was trained before
-    says where fingertips go. OUT is a data set as `pianomime collect` makes it.
+    Demonstrations are played with noise on the controls, and every state is labelled with the
+    expert's control, so that policies also learn to recover. The expert itself plays, or a
+    low-level policy that was trained before (--rollout-policy), which is DAgger proper (Ross et
+    al., 2011). The fingertips are the human's, or those that a high-level policy predicts
+    (--fingertip-policy). OUT is a data set in the form of `pianomime collect`.
 
     Examples:
-      pianomime collect-dagger demonstrations.npz -o lessons.zarr
-      pianomime train high-diff --experts lessons.zarr
-      pianomime train low-diff --experts lessons.zarr -o first --goal out/generalist/goal
-      pianomime collect-dagger demonstrations.npz --pilot first/low-diff.onnx \
-        --planner out/generalist/high-diff.onnx -o more.zarr
-      pianomime train low-diff --experts lessons.zarr more.zarr
+      pianomime collect-dagger demonstrations.npz -o dagger.zarr
+      pianomime train high-diff --experts dagger.zarr
+      pianomime train low-diff --experts dagger.zarr -o first --goal out/generalist/goal
+      pianomime collect-dagger demonstrations.npz --rollout-policy first/low-diff.onnx \
+        --fingertip-policy out/generalist/high-diff.onnx -o more.zarr
+      pianomime train low-diff --experts dagger.zarr more.zarr
     """
 
     demonstrations: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DEMOS")]
     """A folder of demonstrations, or an .npz file of PianoMime's published ones."""
-    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/lessons.zarr")
-    """The data set; one that is there is replaced."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/dagger.zarr")
+    """The data set; an existing one is replaced."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Demonstrations played at the same time; one a core if not given."""
     config: Annotated[DaggerConfig, tyro.conf.arg(name="")] = field(default_factory=DaggerConfig)
-    """Everything else."""
+    """Policies that play, and the noise."""
 
     def run(self) -> None:
-        """Teach, and print how well demonstrations were played meanwhile.
+        """Collect, and print how well the demonstrations were played.
 
         Raises:
-            InputError: demonstrations or the pilot cannot be used.
+            InputError: demonstrations or a policy cannot be used.
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
-        from pianomime.learn.runs.validation import within
+        from pianomime.validation import within
 
         if self.jobs is not None:
             within("jobs", self.jobs, 1)
-        played: list[float] = []
-        with extra("train"), bars() as tell:
-            from pianomime.learn.data.trajectories import write_expert_data
+        f1: list[float] = []
+        with extra("train"), bars() as progress:
+            from pianomime.learn.data.trajectories import write_trajectories
 
-            number = write_expert_data(self.out, self._episodes(tell, played))
-        mean = sum(played) / number
-        print(f"demonstrations played: {number}, at a mean F1 of {mean:.3f}")
+            number = write_trajectories(self.out, self._episodes(progress, f1))
+        print(f"demonstrations played: {number}, at a mean F1 of {sum(f1) / number:.3f}")
         print(f"saved: {self.out}")
 
-    def _episodes(self, tell: Tell, played: list[float]) -> Iterator[Episode]:
-        from pianomime.learn.data.clips import read_human
+    def _episodes(self, progress: Progress, f1: list[float]) -> Iterator[Episode]:
         from pianomime.learn.data.dagger import collect_dagger
+        from pianomime.learn.data.dataset import read_demonstrations
 
-        clips = read_human(self.demonstrations)
-        if self.config.most:
-            clips = clips[:: -(-len(clips) // self.config.most)]
-        for done, episode in enumerate(collect_dagger(clips, self.config, self.jobs), 1):
-            played.append(episode.f1)
+        demonstrations = read_demonstrations(self.demonstrations)
+        limit = self.config.max_demonstrations
+        if limit:
+            demonstrations = demonstrations[:: -(-len(demonstrations) // limit)]
+        episodes = collect_dagger(demonstrations, self.config, self.jobs)
+        for done, episode in enumerate(episodes, 1):
+            f1.append(episode.f1)
             yield episode
-            tell("playing", done, len(clips))
+            progress("playing", done, len(demonstrations))

@@ -1,4 +1,4 @@
-"""What to say where an optional part is not installed."""
+"""One clear message where an optional dependency is not installed."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pianomime.errors import InputError
 
 @contextmanager
 def extra(name: str) -> Iterator[None]:
-    """Say how to install an extra if what is imported inside is not there.
+    """As a context: a missing package becomes a message that says which extra to install.
 
     Args:
         name: of the extra.

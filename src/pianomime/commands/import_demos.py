@@ -11,12 +11,12 @@ import tyro
 
 @dataclass(frozen=True)
 class ImportDemos:
-    """Make demonstrations of the paper's published data, with its known faults repaired.
+    """Import the paper's published demonstrations, with their known faults repaired.
 
-    SOURCE is a folder with PianoMime's high-level zarr data set, an .npz file of clips one after
-    the other (length, fingertips, goal_packed), or one of a single clip (fingertips, goal). OUT
-    then holds one .npz for each clip, also of those that are not for training; each tells which
-    it is, and `pianomime train` and `pianomime collect-dagger` leave these out.
+    SOURCE is a folder with PianoMime's high-level zarr data set, an .npz file of several clips
+    (length, fingertips, goal_packed), or one of a single clip (fingertips, goal). OUT then holds
+    one .npz for each clip of every split; `pianomime train` and `pianomime collect-dagger` use
+    those of the split "train" alone.
 
     Examples:
       pianomime import-demos DATASET.zarr -o demos
@@ -24,11 +24,11 @@ class ImportDemos:
     """
 
     source: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="SOURCE")]
-    """The data."""
+    """The published data."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
     """Folder for the demonstrations; out/demos-SOURCE if not given."""
     clips: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Only the first N."""
+    """Import only the first N."""
 
     def run(self) -> None:
         """Import.

@@ -1,10 +1,16 @@
-"""What a command line names, before it is parsed: that is for its defaults to depend on."""
+"""Reading an option before the command line is parsed, for defaults that depend on it."""
 
 from __future__ import annotations
 
 
-def named(option: str, arguments: list[str], otherwise: str) -> str:
-    """The value of an option such as `--preset`, or what holds where it is not there."""
+def option_value(option: str, arguments: list[str], otherwise: str) -> str:
+    """The value of an option such as `--preset`.
+
+    Args:
+        option: its name, with the dashes.
+        arguments: of the command line.
+        otherwise: the value where the option is not given.
+    """
     for place, argument in enumerate(arguments):
         if argument.startswith(f"{option}="):
             return argument.partition("=")[2]

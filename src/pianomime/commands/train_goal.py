@@ -53,6 +53,7 @@ class TrainGoal:
         print(f"mean error of the decoded distance to the nearest key: {metrics.error_mm:.1f} mm")
         print(
             "rank correlation of distances between codes and between goals: "
-            f"{metrics.code_correlation:.3f} (of the keys themselves: {metrics.key_correlation:.3f})"
+            f"{metrics.code_correlation:.3f} "
+            f"(between keys and between goals: {metrics.key_correlation:.3f})"
         )
         print(f"saved: {self.out}")

@@ -1,4 +1,12 @@
-"""What generalists see and say, in numbers: the same in training and when they play."""
+"""Observation encoding and action decoding of the learned policies, shared by training and play.
+
+An observation is three arrays: `goal` (B, G, 88), the goals of G frames from the present one on;
+`frames` (B, G, F), further features of each of these frames, F = 0 where there are none; and
+`vector` (B, V), all that belongs to the present frame. All are float32.
+
+The points of both hands, (2, 6, 3), are wrist and fingertips, thumb first, of the left and of the
+right hand. Joints and controls are those of the right and then of the left hand, as in a World.
+"""
 
 from __future__ import annotations
 
@@ -8,80 +16,79 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.keyboard import KEYS
 from pianomime.world.hand import both_hands, hand_points
-from pianomime.world.layout import LAYOUT
+from pianomime.world.layout import LAYOUT, POINTS_SIZE
 from pianomime.world.parameters import key_centres
 
-TIPS = 36
-"""Numbers of both hands' points, (2, 6, 3) in a row."""
-JOINTS = 2 * LAYOUT.hand_joints
-CONTROLS = 2 * LAYOUT.hand_actuators
-
-Arrays = dict[str, NDArray[np.float32]]
-"""`goal` (B, G, 88), `frames` (B, C, F) and `vector` (B, V): what a network is given."""
+Observation = dict[str, NDArray[np.float32]]
+"""`goal`, `frames` and `vector`: the inputs of a network."""
+OCTAVE = 12
+"""Keys of an octave."""
 
 
-def high_inputs(goal: NDArray[np.bool_], tips: NDArray[np.floating]) -> Arrays:
-    """What the high level sees.
+def fingertip_observation(goal: NDArray[np.bool_], points: NDArray[np.floating]) -> Observation:
+    """Observation of the high-level policy, which predicts fingertips.
 
     Args:
-        goal: (B, 10, 88) of this frame and those that follow.
-        tips: (B, 2, 6, 3) where forearms and fingertips are [m].
+        goal: (B, 10, 88) keys that should be down in this frame and in those that follow.
+        points: (B, 2, 6, 3) present wrists and fingertips in the world frame [m].
     """
     return {
         "goal": goal.astype(np.float32),
         "frames": np.zeros((len(goal), goal.shape[1], 0), np.float32),
-        "vector": from_wrists(tips).reshape(len(tips), TIPS).astype(np.float32),
+        "vector": relative_to_wrist(points).reshape(len(points), POINTS_SIZE).astype(np.float32),
     }
 
 
-def from_wrists(points: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Points (..., 2, 6, 3) with the fingertips told from where their forearm is.
+def relative_to_wrist(points: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Points (..., 2, 6, 3) [m] with the fingertips relative to their wrist.
 
-    So hands do not come apart where a policy goes on from what it said before.
+    Hands then keep their shape when a high-level policy continues from its own predictions. Wrists
+    stay in the world frame.
     """
-    told = points.copy()
-    told[..., 1:, :] -= points[..., :1, :]
-    return told
+    relative = points.copy()
+    relative[..., 1:, :] -= points[..., :1, :]
+    return relative
 
 
-def to_world(told: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Points (..., 2, 6, 3) in the world, of what `from_wrists` told."""
-    points = told.copy()
-    points[..., 1:, :] += told[..., :1, :]
+def to_world_frame(relative: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Points (..., 2, 6, 3) [m] in the world frame; the inverse of `relative_to_wrist`."""
+    points = relative.copy()
+    points[..., 1:, :] += relative[..., :1, :]
     return points
 
 
-def low_inputs(
+def tracking_observation(
     goal: NDArray[np.bool_],
     targets: NDArray[np.floating] | None,
-    tips: NDArray[np.floating],
+    points: NDArray[np.floating],
     joints: NDArray[np.floating],
     velocities: NDArray[np.floating],
     keys: NDArray[np.floating],
-    prior: NDArray[np.floating] | None,
-) -> Arrays:
-    """What the low level sees, or a policy of one stage.
+    base: NDArray[np.floating] | None,
+) -> Observation:
+    """Observation of the low-level policy, and of an end-to-end one; both predict controls.
 
     Args:
-        goal: (B, C, 88) of this frame and those that follow.
-        targets: (B, C, 2, 6, 3) the plan's points in these frames [m]; None for one stage.
-        tips: (B, 2, 6, 3) where the points are [m].
-        joints: (B, 54) right, left [rad, m].
-        velocities: (B, 54) the same [rad/s, m/s].
-        keys: (B, 88) how far each is down.
-        prior: (B, 46) what inverse kinematics proposes for this frame [rad, m], where it is seen.
+        goal: (B, 4, 88) keys that should be down in this frame and in those that follow.
+        targets: (B, 4, 2, 6, 3) planned points in these frames, world frame [m]; None for an
+            end-to-end policy.
+        points: (B, 2, 6, 3) present points, world frame [m].
+        joints: (B, 54) positions of the hands' joints [rad, m].
+        velocities: (B, 54) their velocities [rad/s, m/s].
+        keys: (B, 88) how far each key is down, 0..1.
+        base: (B, 46) control of the base controller for this frame [rad, m]; None unless the
+            policy is a residual one.
     """
     batch, chunk = goal.shape[:2]
     if targets is None:
         frames = np.zeros((batch, chunk, 0))
     else:
-        off = targets - tips[:, None]
-        frames = np.concatenate([targets, off], axis=2).reshape(batch, chunk, 2 * TIPS)
-    parts = [joints, velocities, keys, tips.reshape(batch, TIPS)]
-    if prior is not None:
-        parts.append(prior)
+        error = targets - points[:, None]
+        frames = np.concatenate([targets, error], axis=2).reshape(batch, chunk, 2 * POINTS_SIZE)
+    parts = [joints, velocities, keys, points.reshape(batch, POINTS_SIZE)]
+    if base is not None:
+        parts.append(base)
     return {
         "goal": goal.astype(np.float32),
         "frames": frames.astype(np.float32),
@@ -90,49 +97,50 @@ def low_inputs(
 
 
 @cache
-def rest_tips() -> NDArray[np.float64]:
-    """(2, 6, 3) [m] where the points are at rest; read-only."""
-    tips: NDArray[np.float64] = hand_points(np.zeros((1, JOINTS)))[0]
-    tips.setflags(write=False)
-    return tips
+def rest_points() -> NDArray[np.float64]:
+    """(2, 6, 3) [m] points of the hands at rest, world frame; read-only."""
+    points: NDArray[np.float64] = hand_points(np.zeros((1, LAYOUT.hands_size)))[0]
+    points.setflags(write=False)
+    return points
 
 
-def octave() -> float:
-    """How far [m] an octave is along the keyboard."""
+def octave_width() -> float:
+    """Length of an octave along the keyboard [m]."""
     centres = key_centres()
-    return float(centres[12, 1] - centres[0, 1])
+    return float(centres[OCTAVE, 1] - centres[0, 1])
 
 
-def base(level: str, prior: bool, vector: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What chunks are told relative to, (B, 1, D).
+def action_reference(
+    level: str, residual: bool, vector: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Reference that action chunks are relative to, (B, 1, D).
 
-    Controls to those that hold the present pose, so that a network need not tell millimetres in
-    numbers that span the keyboard; fingertips, and what is added to a prior, to nothing.
+    Controls are relative to those that hold the present pose, so that a network need not resolve
+    millimetres in numbers that span the keyboard. Fingertips and residuals are relative to 0.
 
     Args:
-        level: "high", "low" or "whole".
-        prior: whether controls are told as what to add to a prior.
-        vector: (B, V) what is seen.
+        level: as `PolicyInfo.level`.
+        residual: as `PolicyInfo.residual`.
+        vector: (B, V) of the observation; joints come first in those of controls.
     """
     if level == "high":
-        return np.zeros((len(vector), 1, TIPS), np.float32)
-    if prior:
-        return np.zeros((len(vector), 1, CONTROLS), np.float32)
-    held: NDArray[np.float32] = holding(vector[:, :JOINTS])[:, None]
+        return np.zeros((len(vector), 1, POINTS_SIZE), np.float32)
+    if residual:
+        return np.zeros((len(vector), 1, LAYOUT.ctrl_size), np.float32)
+    held: NDArray[np.float32] = holding_controls(vector[:, : LAYOUT.hands_size])[:, None]
     return held
 
 
-def holding(joints: NDArray[Any]) -> NDArray[Any]:
-    """(B, 46) the controls that hold joints (B, 54), without load [rad, m]; in their precision."""
-    held: NDArray[Any] = joints @ _to_controls().T
+def holding_controls(joints: NDArray[Any]) -> NDArray[Any]:
+    """(B, 46) controls that hold joints (B, 54) in place without load [rad, m]; same precision."""
+    held: NDArray[Any] = joints @ _joints_to_controls().T
     return held
 
 
 @cache
-def _to_controls() -> NDArray[np.float32]:
-    """(46, 54) from joints to the controls that hold them, without load."""
-    matrix = np.zeros((CONTROLS, JOINTS), np.float32)
-    for hand in both_hands():
-        joints = slice(hand.joints.start - KEYS, hand.joints.stop - KEYS)
-        matrix[hand.actuators, joints] = hand.to_ctrl
+def _joints_to_controls() -> NDArray[np.float32]:
+    """(46, 54) matrix from joints to the controls that hold them without load."""
+    matrix = np.zeros((LAYOUT.ctrl_size, LAYOUT.hands_size), np.float32)
+    for index, hand in enumerate(both_hands()):
+        matrix[hand.actuators, LAYOUT.among_hands(index)] = hand.to_ctrl
     return matrix

@@ -1,6 +1,6 @@
-"""How far generalists look and plan ahead (paper, appendix F)."""
+"""Horizons of the learned policies (paper, appendix F). Cheap to import: no numpy."""
 
 CHUNK = 4
-"""Frames that are said at once."""
-HIGH_GOALS = 10
-"""Frames of goals that the high level sees."""
+"""Frames of actions that a policy predicts at once, and frames that low levels see ahead."""
+GOAL_HORIZON = 10
+"""Frames of goals that high levels see: the present one and those that follow."""

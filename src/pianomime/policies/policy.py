@@ -1,103 +1,270 @@
-"""A trained stage of a generalist, as an ONNX file, run without torch."""
+"""A learned policy as it is played: an ONNX network with its metadata, run without torch."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.policies.features import Arrays, base
+from pianomime.policies.features import Observation, action_reference
 from pianomime.policies.sampler import Sampler, ddim_sample
 
-FORMAT = "pianomime stage"
-VERSION = 1
+FORMAT = "pianomime policy"
+VERSION = 2
+METADATA = "pianomime"
+"""Name of the ONNX metadata property that holds a `PolicyInfo` as JSON."""
 
+Level = Literal["high", "low", "end-to-end", "finger"]
+"""From goals to fingertips; from fingertips to controls; from goals straight to controls; from one
+finger's surroundings to what it adds to the base controller."""
+NetworkKind = Literal["diffusion", "bet", "mlp"]
+Prediction = Literal["epsilon", "sample"]
+"""What a diffusion network outputs: the noise, or the sample without it (Ho et al., "Denoising
+diffusion probabilistic models", 2020)."""
 
 Inference = Callable[[dict[str, NDArray[Any]]], list[NDArray[np.float32]]]
-"""Gives what a network says of what it is given, by name."""
+"""Runs a network: named input arrays to a list of output arrays."""
+
+
+@dataclass(frozen=True)
+class AsinhNormalizer:
+    """Actions of a diffusion, normalized to -1..1 by an area hyperbolic sine.
+
+    Linear near the median, logarithmic in the tails: see the normalizer of the same name in
+    `pianomime.learn.imitation.normalizer`, which fits it.
+
+    Attributes:
+        median: (D,) the action that becomes 0 [rad, m].
+        unit: (D,) distance from the median up to which it is about linear [rad, m].
+        limit: (D,) asinh((action - median) / unit) that becomes 1.
+
+    Raises:
+        InputError: they are not three rows of finite numbers of one length.
+    """
+
+    median: tuple[float, ...]
+    unit: tuple[float, ...]
+    limit: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            try:
+                numbers = tuple(map(float, values))
+            except (TypeError, ValueError) as error:
+                raise InputError(f"normalizer.{name} must be numbers") from error
+            if len(numbers) != len(self.median) or not np.isfinite(numbers).all():
+                raise InputError(f"normalizer.{name} must be {len(self.median)} finite numbers")
+            object.__setattr__(self, name, numbers)
+
+    def denormalize(self, normalized: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Actions (..., D) [rad, m] of normalized ones (..., D)."""
+        median, unit, limit = (
+            np.array(row, np.float32) for row in (self.median, self.unit, self.limit)
+        )
+        action: NDArray[np.float32] = np.sinh(normalized * limit) * unit + median
+        return action
+
+
+@dataclass(frozen=True)
+class DiffusionInfo:
+    """What sampling from a diffusion needs to know of its training.
+
+    Attributes:
+        steps: steps of the diffusion in training.
+        prediction: what the network outputs.
+        normalizer: of its actions.
+
+    Raises:
+        InputError: one of them is not of its kind.
+    """
+
+    steps: int
+    prediction: Prediction
+    normalizer: AsinhNormalizer
+
+    def __post_init__(self) -> None:
+        _check_integer("diffusion.steps", self.steps, 2)
+        _check_choice("diffusion.prediction", self.prediction, get_args(Prediction))
+
+
+@dataclass(frozen=True)
+class PolicyInfo:
+    """What a policy is, as its file tells; in the file it is JSON, see `to_metadata`.
+
+    Attributes:
+        name: such as "high-diff", which `pianomime train` takes.
+        level: what it maps from and to.
+        network: kind of network.
+        action_size: D, numbers of the action for one frame.
+        chunk: T, frames of actions that one call predicts.
+        residual: whether actions are added to those of the base controller.
+        diffusion: how a diffusion was trained; None for other networks.
+        data: hash that identifies the training data; "" if it was not recorded.
+        licence: SPDX identifier, or a few words; "" if nobody said.
+
+    Raises:
+        InputError: a field is not of its kind, or two do not fit together.
+    """
+
+    name: str
+    level: Level
+    network: NetworkKind
+    action_size: int
+    chunk: int = 1
+    residual: bool = False
+    diffusion: DiffusionInfo | None = None
+    data: str = ""
+    licence: str = ""
+
+    def __post_init__(self) -> None:
+        for field in ("name", "data", "licence"):
+            if not isinstance(getattr(self, field), str):
+                raise InputError(f"{field} must be text, not {getattr(self, field)!r}")
+        _check_choice("level", self.level, get_args(Level))
+        _check_choice("network", self.network, get_args(NetworkKind))
+        _check_integer("action_size", self.action_size, 1)
+        _check_integer("chunk", self.chunk, 1)
+        if not isinstance(self.residual, bool):
+            raise InputError(f"residual must be true or false, not {self.residual!r}")
+        if self.residual and self.level == "high":
+            raise InputError("a policy that outputs fingertips has no base controller to add to")
+        if (self.network == "diffusion") != (self.diffusion is not None):
+            raise InputError("a diffusion network, and no other, tells of its diffusion")
+        if self.diffusion is not None:
+            size = len(self.diffusion.normalizer.median)
+            if size != self.action_size:
+                raise InputError(f"normalizer of {size} numbers for actions of {self.action_size}")
+
+    @classmethod
+    def from_metadata(cls, metadata: str) -> PolicyInfo:
+        """Read what `to_metadata` wrote.
+
+        Raises:
+            InputError: it is something else, of another version, or says what cannot be.
+        """
+        try:
+            content = json.loads(metadata)
+        except ValueError as error:
+            raise InputError("metadata that are not JSON") from error
+        if not isinstance(content, dict) or content.pop("format", None) != FORMAT:
+            raise InputError(f"not a {FORMAT}")
+        version = content.pop("version", None)
+        if version != VERSION:
+            raise InputError(f"a policy of version {version}; this program reads {VERSION}")
+        diffusion = content.pop("diffusion", None)
+        if diffusion is not None:
+            _check_fields(DiffusionInfo, diffusion, "diffusion.")
+            normalizer = diffusion["normalizer"]
+            _check_fields(AsinhNormalizer, normalizer, "normalizer.")
+            diffusion = DiffusionInfo(**diffusion | {"normalizer": AsinhNormalizer(**normalizer)})
+        content["diffusion"] = diffusion
+        _check_fields(cls, content)
+        return cls(**content)
+
+    def to_metadata(self) -> str:
+        """JSON with `format`, `version` and every field."""
+        return json.dumps({"format": FORMAT, "version": VERSION, **asdict(self)})
 
 
 class Policy(Protocol):
-    """Says chunks."""
+    """Predicts action chunks (Zhao et al., "Learning fine-grained bimanual manipulation", 2023)."""
 
-    def say(self, seen: Arrays, draw: np.random.Generator) -> NDArray[np.float32]:
-        """(B, T, D) of what is seen, as `pianomime.policies.features` makes it."""
+    def act(self, observation: Observation, rng: np.random.Generator) -> NDArray[np.float32]:
+        """Chunks of actions, sampled where the policy is stochastic.
+
+        Args:
+            observation: of B worlds, as `pianomime.policies.features` encodes it.
+            rng: source of all randomness; policies that are deterministic leave it alone.
+
+        Returns:
+            (B, T, D) of this frame and those that follow: points (2, 6, 3) in a row, relative to
+            the wrist, of a high level [m]; controls of others, or what a residual policy adds to
+            them [rad, m].
+        """
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class OnnxPolicy:
-    """A trained stage.
+class NetworkPolicy:
+    """A policy whose network is run by a function: by ONNX Runtime, or by torch in training.
 
     Attributes:
-        run: the network.
-        about: `stage`, `level`, `prior`, `network`, `chunk`, `width`, and of a diffusion `steps`
-            and `prediction`, and the `scale` of what is said.
-        sampler: how a diffusion is run.
+        run: the network; inputs `goal`, `frames` and `vector` of an observation, and for a
+            diffusion `noisy` (B, T, D) and `step` (B,) int64.
+        info: what it is.
+        sampler: how a diffusion is sampled.
     """
 
     run: Inference
-    about: dict[str, Any]
+    info: PolicyInfo
     sampler: Sampler
 
-    def say(self, seen: Arrays, draw: np.random.Generator) -> NDArray[np.float32]:
-        """As `Policy.say`."""
-        about = self.about
-        given = {name: seen[name] for name in ("goal", "frames", "vector") if seen[name].size}
-        if about["network"] == "diffusion":
-            noise = draw.standard_normal((len(seen["goal"]), about["chunk"], about["width"]))
-            scaled = ddim_sample(
-                lambda noisy, step: self.run({**given, "noisy": noisy, "step": step})[0],
-                noise.astype(np.float32),
-                about["steps"],
-                about["prediction"],
+    def act(self, observation: Observation, rng: np.random.Generator) -> NDArray[np.float32]:
+        """As `Policy.act`."""
+        info = self.info
+        # Exported networks have no inputs of size 0.
+        inputs = {
+            name: observation[name]
+            for name in ("goal", "frames", "vector")
+            if observation[name].size
+        }
+        if info.diffusion is not None:
+            shape = (len(observation["goal"]), info.chunk, info.action_size)
+            normalized = ddim_sample(
+                lambda noisy, step: self.run({**inputs, "noisy": noisy, "step": step})[0],
+                rng.standard_normal(shape).astype(np.float32),
+                info.diffusion.steps,
+                info.diffusion.prediction,
                 self.sampler,
-                draw,
+                rng,
             )
-            scale = {name: np.float32(values) for name, values in about["scale"].items()}
-            said = np.sinh(scaled * scale["limit"]) * scale["unit"] + scale["middle"]
-        elif about["network"] == "bet":
-            chance, exact = self.run(given)
-            pick = (draw.random((*chance.shape[:2], 1)) > chance.cumsum(axis=2)).sum(axis=2)
-            pick = np.minimum(pick, chance.shape[2] - 1)
-            said = np.take_along_axis(exact, pick[..., None, None], axis=2)[:, :, 0]
+            action = info.diffusion.normalizer.denormalize(normalized)
+        elif info.network == "bet":
+            # Behaviour transformer: sample a bin, and take that bin's corrected action.
+            probability, actions = self.run(inputs)
+            bins = (rng.random((*probability.shape[:2], 1)) > probability.cumsum(axis=2)).sum(
+                axis=2
+            )
+            bins = np.minimum(bins, probability.shape[2] - 1)
+            action = np.take_along_axis(actions, bins[..., None, None], axis=2)[:, :, 0]
         else:
-            said = self.run(given)[0]
-        relative: NDArray[np.float32] = said + base(about["level"], about["prior"], seen["vector"])
-        return relative
+            action = self.run(inputs)[0]
+        reference = action_reference(info.level, info.residual, observation["vector"])
+        absolute: NDArray[np.float32] = action + reference
+        return absolute
 
 
-def load_policy(path: Path, sampler: Sampler | None = None, stage: str = "") -> OnnxPolicy:
-    """A stage that was exported, run by ONNX Runtime.
+def load_policy(path: Path, sampler: Sampler | None = None, name: str = "") -> NetworkPolicy:
+    """A policy from its ONNX file, run by ONNX Runtime.
 
     Args:
         path: of the file.
-        sampler: how a diffusion is run.
-        stage: as `load_network`.
+        sampler: how a diffusion is sampled.
+        name: that the policy must have; any if not given.
 
     Raises:
         InputError: as `load_network`.
     """
-    run, about = load_network(path, stage)
-    return OnnxPolicy(run, about, sampler or Sampler())
+    run, info = load_network(path, name)
+    return NetworkPolicy(run, info, sampler or Sampler())
 
 
-def load_network(path: Path, stage: str = "") -> tuple[Inference, dict[str, Any]]:
-    """A network that was exported: what runs it, and what it tells of itself.
+def load_network(path: Path, name: str = "") -> tuple[Inference, PolicyInfo]:
+    """The network of an ONNX file, and its metadata.
 
     Args:
         path: of the file.
-        stage: that it must hold; any if not given.
+        name: that the policy must have; any if not given.
 
     Raises:
-        InputError: there is no such file, it is damaged, of another version or of another stage, or
-            ONNX Runtime is not installed.
+        InputError: there is no such file, it is damaged, of another version or of another policy,
+            or ONNX Runtime is not installed.
     """
     try:
         import onnxruntime
@@ -115,13 +282,34 @@ def load_network(path: Path, stage: str = "") -> tuple[Inference, dict[str, Any]
         session = onnxruntime.InferenceSession(
             str(path), options, providers=["CPUExecutionProvider"]
         )
-        about = json.loads(session.get_modelmeta().custom_metadata_map["about"])
-        known = about["format"] == FORMAT and about["version"] == VERSION
+        properties = session.get_modelmeta().custom_metadata_map
     # ONNX Runtime's errors have no class in common but this.
     except Exception as error:
-        raise InputError(f"{path}: damaged, or not a stage of a player") from error
-    if not known:
-        raise InputError(f"{path}: a stage of another version than this program's")
-    if stage not in ("", about["stage"]):
-        raise InputError(f"{path}: holds the stage {about['stage']}, not {stage}")
-    return lambda given: session.run(None, given), about
+        raise InputError(f"{path}: damaged, or not an ONNX file") from error
+    if METADATA not in properties:
+        raise InputError(f"{path}: not a policy of version {VERSION} of this program's format")
+    try:
+        info = PolicyInfo.from_metadata(properties[METADATA])
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    if name not in ("", info.name):
+        raise InputError(f"{path}: holds the policy {info.name}, not {name}")
+    return lambda inputs: session.run(None, inputs), info
+
+
+def _check_integer(name: str, value: Any, least: int) -> None:
+    if type(value) is not int or value < least:
+        raise InputError(f"{name} must be a whole number from {least} on, not {value!r}")
+
+
+def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise InputError(f"{name} must be one of {', '.join(choices)}, not {value!r}")
+
+
+def _check_fields(kind: type[Any], content: Mapping[str, Any], prefix: str = "") -> None:
+    """Refuse metadata that lack a field or have one too many."""
+    known = {field.name for field in fields(kind)}
+    if not isinstance(content, dict) or set(content) != known:
+        odd = ", ".join(sorted(prefix + name for name in known ^ {*content}))
+        raise InputError(f"metadata with fields missing or unknown: {odd}")

@@ -1,7 +1,8 @@
-"""Running a diffusion backwards, in NumPy: DDIM, and DDPM as its noisy extreme.
+"""Sampling from a diffusion model, in NumPy: DDIM, and DDPM as its noisiest case.
 
 Training uses the schedules of `diffusers`; this is the same arithmetic, so that playing needs no
-torch (Song et al., "Denoising diffusion implicit models", equations 12 and 16).
+torch (Song, Meng and Ermon, "Denoising diffusion implicit models", 2021, equations 12 and 16; Ho,
+Jain and Abbeel, "Denoising diffusion probabilistic models", 2020).
 """
 
 from __future__ import annotations
@@ -15,22 +16,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 Denoise = Callable[[NDArray[np.float32], NDArray[np.int64]], NDArray[np.float32]]
-"""From noisy chunks (B, T, D) and their steps (B,) to what the network says of them."""
+"""The network: from noisy chunks (B, T, D) and diffusion steps (B,) to predictions (B, T, D)."""
 
 
 @dataclass(frozen=True)
 class Sampler:
-    """How a diffusion is run: the same weights allow all."""
+    """How a diffusion is sampled; one set of weights allows all."""
 
     steps: int = 10
-    """Calls of the network, as many as the diffusion has steps at most."""
+    """Evaluations of the network; at most as many as the diffusion has steps."""
     eta: float = 0.0
-    """Noise that is added on the way: 0 is DDIM; 1 with all steps is DDPM, as in the paper."""
+    """Noise added on the way: 0 is DDIM; 1 with all steps is DDPM, as in the paper."""
 
 
 @cache
-def signal(steps: int) -> NDArray[np.float64]:
-    """(steps,) squared share of the signal that is left after each step, by a cosine; read-only."""
+def alphas_cumprod(steps: int) -> NDArray[np.float64]:
+    """(steps,) share of the signal's variance left after each step, alpha-bar; read-only.
+
+    By the squared-cosine schedule (Nichol and Dhariwal, "Improved denoising diffusion probabilistic
+    models", 2021, equation 17).
+    """
 
     def level(time: float) -> float:
         return math.cos((time + 0.008) / 1.008 * math.pi / 2) ** 2
@@ -47,30 +52,30 @@ def ddim_sample(
     steps: int,
     prediction: str,
     sampler: Sampler,
-    draw: np.random.Generator,
+    rng: np.random.Generator,
 ) -> NDArray[np.float32]:
-    """Chunks (B, T, D) within -1..1 of noise alone (B, T, D).
+    """Chunks (B, T, D), within -1..1, from pure noise (B, T, D).
 
     Args:
         denoise: the network.
-        noise: where to begin.
+        noise: (B, T, D) standard normal.
         steps: of the diffusion in training.
-        prediction: what the network says: "epsilon", the noise, or "sample", what is without it.
-        sampler: how.
-        draw: of what is added on the way.
+        prediction: what the network outputs: "epsilon", the noise, or "sample", the chunk without.
+        sampler: how to sample.
+        rng: of the noise that is added on the way, if `sampler.eta` is above 0.
     """
-    left = signal(steps)
+    left = alphas_cumprod(steps)
     x = noise.astype(np.float64)
     number = min(sampler.steps, steps)
     times = np.round(steps - np.arange(number) * steps / number).astype(np.int64) - 1
     for now, after in zip(times, [*times[1:], -1], strict=True):
-        said = denoise(x.astype(np.float32), np.full(len(x), now, np.int64))
+        output = denoise(x.astype(np.float32), np.full(len(x), now, np.int64))
         here, there = left[now], left[after] if after >= 0 else 1.0
-        clean = said if prediction == "sample" else (x - math.sqrt(1 - here) * said) / here**0.5
+        clean = output if prediction == "sample" else (x - math.sqrt(1 - here) * output) / here**0.5
         clean = np.clip(clean, -1.0, 1.0)
         direction = (x - math.sqrt(here) * clean) / math.sqrt(1 - here)
         spread = sampler.eta * math.sqrt((1 - there) / (1 - here) * (1 - here / there))
         x = math.sqrt(there) * clean + math.sqrt(max(1 - there - spread**2, 0.0)) * direction
         if spread:
-            x = x + spread * draw.standard_normal(x.shape)
+            x = x + spread * rng.standard_normal(x.shape)
     return x.astype(np.float32)

@@ -9,7 +9,7 @@ from pianomime import cli
 from pianomime.errors import InputError
 from pianomime.learn.data.dagger import collect_dagger, collect_dagger_episode
 from pianomime.learn.data.dagger_config import DaggerConfig
-from pianomime.learn.data.trajectories import ExpertData
+from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.methods import weights_folder
 from pianomime.track import DynamicTracker
@@ -18,35 +18,33 @@ from pianomime.world import World
 QUIET = DaggerConfig(noise=0.0)
 
 
-def test_without_noise_the_teacher_plays(two_notes):
+def test_without_noise_the_expert_plays(two_notes):
     episode = collect_dagger_episode(replace(two_notes, song=7), 0, QUIET)
-    tracker, world = DynamicTracker(), World()
-    tracker.begin(make_feasible(two_notes.plan))
+    controller, world = DynamicTracker().start(make_feasible(two_notes.plan)), World()
     for frame in range(len(two_notes.plan)):
         np.testing.assert_allclose(episode.columns["joints"][frame], world.qpos_hands, atol=1e-6)
-        ctrl = tracker.control(frame, world)
+        ctrl = controller.control(frame, world)
         np.testing.assert_allclose(episode.columns["action"][frame], ctrl, atol=1e-6)
         world.step(ctrl)
     assert episode.song == 7
     assert episode.f1 > 0.7
 
 
-def test_with_noise_the_teacher_says_how_to_come_back(two_notes):
-    """What is written down is what it would do, not what was done."""
+def test_with_noise_the_labels_are_the_experts(two_notes):
+    """What it would do in these states, not what was done."""
     one, other = (
         collect_dagger_episode(two_notes, 0, replace(QUIET, noise=noise)) for noise in (0.05, 0.3)
     )
     assert np.abs(one.columns["joints"] - other.columns["joints"]).max() > 0.02
-    tracker, world = DynamicTracker(), World()
-    tracker.begin(make_feasible(two_notes.plan))
+    controller, world = DynamicTracker().start(make_feasible(two_notes.plan)), World()
     for frame in (5, 20):
         world.data.qpos[88:] = other.columns["joints"][frame]
         np.testing.assert_allclose(
-            other.columns["action"][frame], tracker.control(frame, world), atol=1e-5
+            other.columns["action"][frame], controller.control(frame, world), atol=1e-5
         )
 
 
-def test_lessons_are_the_same_however_many_are_held_at_once(two_notes):
+def test_episodes_are_the_same_however_many_are_played_at_once(two_notes):
     clips, config = [replace(two_notes, song=song) for song in range(3)], DaggerConfig()
     alone = [one.columns["action"] for one in collect_dagger(clips, config, jobs=1)]
     together = [one.columns["action"] for one in collect_dagger(clips, config, jobs=2)]
@@ -58,41 +56,47 @@ def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
     for number in range(5):
         replace(two_notes, song=number).save(tmp_path / f"{number}.npz")
     replace(two_notes, split="test").save(tmp_path / "not for training.npz")
-    out = tmp_path / "lessons.zarr"
-    cli.main(["teach", str(tmp_path), "-o", str(out), "--jobs", "1", "--most", "2"])
+    out = tmp_path / "dagger.zarr"
+    cli.main(
+        ["collect-dagger", str(tmp_path), "-o", str(out), "--jobs", "1"]
+        + ["--max-demonstrations", "2"]
+    )
     assert "played: 2," in capsys.readouterr().out
-    assert [about["song"] for about in ExpertData.open(out).episodes] == [0, 3]
+    assert [episode["song"] for episode in TrajectoryData.open(out).episodes] == [0, 3]
 
 
 @pytest.mark.parametrize(
-    "config",
+    "settings",
     [
-        DaggerConfig(noise=-1.0),
-        DaggerConfig(noise=float("nan")),
-        DaggerConfig(smooth=1.0),
-        DaggerConfig(seed=-1),
+        {"noise": -1.0},
+        {"noise": float("nan")},
+        {"noise_correlation": 1.0},
+        {"max_demonstrations": -1},
+        {"seed": -1},
     ],
 )
-def test_settings_out_of_range_are_refused(two_notes, config):
+def test_settings_out_of_range_are_refused(settings):
     with pytest.raises(InputError):
-        next(collect_dagger([two_notes], config))
+        DaggerConfig(**settings)
 
 
-def test_who_says_something_else_is_refused(two_notes):
+def test_a_policy_of_another_level_is_refused(two_notes):
     clips = [two_notes]
     weights = weights_folder()
     for config in (
-        DaggerConfig(pilot=weights / "high-diff.onnx"),
-        DaggerConfig(pilot=weights / "fingers.onnx"),
-        DaggerConfig(planner=weights / "low-diff.onnx"),
+        DaggerConfig(rollout_policy=weights / "high-diff.onnx"),
+        DaggerConfig(rollout_policy=weights / "fingers.onnx"),
+        DaggerConfig(fingertip_policy=weights / "low-diff.onnx"),
     ):
-        with pytest.raises(InputError, match="not a stage"):
+        with pytest.raises(InputError, match="not a policy"):
             next(collect_dagger(clips, config))
 
 
-def test_a_high_level_and_a_pilot_hold_a_lesson(two_notes):
+def test_a_fingertip_policy_and_a_rollout_policy_play(two_notes):
     weights = weights_folder()
-    config = DaggerConfig(pilot=weights / "low-mse.onnx", planner=weights / "high-diff.onnx")
+    config = DaggerConfig(
+        rollout_policy=weights / "low-mse.onnx", fingertip_policy=weights / "high-diff.onnx"
+    )
     shown, usual = (collect_dagger_episode(two_notes, 0, one) for one in (config, QUIET))
     assert not np.array_equal(shown.columns["fingertips"], usual.columns["fingertips"])
     np.testing.assert_array_equal(shown.columns["goal"], usual.columns["goal"])
@@ -101,7 +105,7 @@ def test_a_high_level_and_a_pilot_hold_a_lesson(two_notes):
 
 def test_another_seed_draws_otherwise(two_notes):
     weights = weights_folder()
-    config = DaggerConfig(planner=weights / "high-diff.onnx", noise=0.0)
+    config = DaggerConfig(fingertip_policy=weights / "high-diff.onnx", noise=0.0)
     one, again, other = (
         collect_dagger_episode(two_notes, 0, replace(config, seed=seed)).columns["fingertips"]
         for seed in (1, 1, 2)
@@ -116,8 +120,8 @@ def test_no_jobs_are_refused(tmp_path, capsys):
     assert "jobs must be 1 or more" in capsys.readouterr().err
 
 
-def test_a_pilot_that_is_no_low_level_is_refused(two_notes, tmp_path):
-    (tmp_path / "pilot.onnx").write_bytes(b"not a network")
-    config = DaggerConfig(pilot=tmp_path / "pilot.onnx")
+def test_a_rollout_policy_that_is_damaged_is_refused(two_notes, tmp_path):
+    (tmp_path / "policy.onnx").write_bytes(b"not a network")
+    config = DaggerConfig(rollout_policy=tmp_path / "policy.onnx")
     with pytest.raises(InputError, match="damaged"):
         next(collect_dagger([two_notes], config))

@@ -87,7 +87,7 @@ def four_clips(clip, tmp_path):
 
 def test_what_is_not_for_training_is_left_out_of_it(four_clips, tmp_path):
     pytest.importorskip("zarr")
-    from pianomime.learn.data.clips import read_human
+    from pianomime.learn.data.dataset import read_demonstrations
 
     cli.main(["import-demos", str(four_clips), "-o", str(tmp_path / "demos")])
     made = [Demonstration.load(file) for file in sorted((tmp_path / "demos").iterdir())]
@@ -98,7 +98,7 @@ def test_what_is_not_for_training_is_left_out_of_it(four_clips, tmp_path):
         (8, "odd"),
     ]
     for source in (four_clips, tmp_path / "demos"):
-        titles = [one.score.title for one in read_human(source)]
+        titles = [one.score.title for one in read_demonstrations(source)]
         assert titles == ["clips-000", "clips-001"]
 
 

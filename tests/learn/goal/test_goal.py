@@ -108,7 +108,9 @@ def test_training_measures_on_other_files_and_can_be_read(folder, tmp_path):
 
 
 def test_it_learns_where_keys_are(folder, tmp_path):
-    short = GoalConfig(transpose=0, trainer=TrainerConfig(steps=5, batch=32, warmup=1, bfloat16=False))
+    short = GoalConfig(
+        transpose=0, trainer=TrainerConfig(steps=5, batch=32, warmup=1, bfloat16=False)
+    )
     config = GoalConfig(
         transpose=0,
         trainer=TrainerConfig(steps=400, batch=32, learning_rate=3e-3, warmup=20, bfloat16=False),

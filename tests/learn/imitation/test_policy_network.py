@@ -6,48 +6,55 @@ import numpy as np
 import pytest
 import torch
 
-from pianomime import Player
+from pianomime import load_player
 from pianomime.errors import InputError
-from pianomime.learn.data.samples import Windows
+from pianomime.learn.data.samples import Samples
 from pianomime.learn.goal.autoencoder import GoalEncoder
-from pianomime.learn.imitation.config import POLICIES, DiffusionConfig, check_stage, policy_config
-from pianomime.learn.imitation.export import export_stage, torch_policy
-from pianomime.learn.imitation.network import SaidScale, Stage
+from pianomime.learn.imitation.config import POLICIES, DiffusionConfig, policy_config
+from pianomime.learn.imitation.export import export_policy, policy_info, torch_policy
+from pianomime.learn.imitation.network import PolicyNetwork
+from pianomime.learn.imitation.normalizer import AsinhNormalizer
 from pianomime.learn.imitation.unet import FrameConvolution, TemporalEncoder
-from pianomime.policies.features import base
+from pianomime.policies.features import action_reference
 from pianomime.policies.methods import WEIGHTS
 from pianomime.policies.policy import load_policy
 from pianomime.policies.sampler import Sampler
 
-SEEN = ("goal", "frames", "vector")
-TINY = DiffusionConfig(channels=(16, 32, 32), condition=(32,), step_width=16)
+INPUTS = ("goal", "frames", "vector")
+TINY = DiffusionConfig(channels=(16, 32, 32), condition_layers=(32,), step_embedding=16)
 
 
-def a_stage(clips, name, size="small", encoder=None, **changes):
-    code = "binary" if encoder is None else "sdf"
-    config = replace(policy_config(name, size), code=code, tip_noise=0.0, **changes)
-    sample = Windows.of(clips, config).some(57)
+def a_network(clips, name, size="small", encoder=None, tiny=False):
+    encoding = "binary" if encoder is None else "sdf"
+    config = replace(policy_config(name, size), goal_encoding=encoding, tip_noise=0.0)
+    if tiny and config.network == "diffusion":
+        config = replace(config, diffusion=TINY)
+    sample = Samples.of(clips, config).evenly(57)
     torch.manual_seed(0)
-    stage = Stage(config, {key: value.shape[1:] for key, value in sample.items()}, encoder)
-    return stage, sample
+    shapes = {key: value.shape[1:] for key, value in sample.items()}
+    return PolicyNetwork(config, shapes, encoder), sample
 
 
-def by_hand(stage):
+def export(network, name, path):
+    export_policy(network, policy_info(network, name), path)
+
+
+def by_hand(network):
     """Parameters of a U-Net and its encoder, counted from tables 7 and the sizes seen."""
-    config, (channels, vector) = stage.config.diffusion, seen_widths(stage)
-    width, told = len(stage.target.middle), config.step_width
-    frames = 10 if stage.config.level == "high" else 4
+    config, (channels, vector) = network.config.diffusion, input_sizes(network)
+    width, embedding = network.action_size, config.step_embedding
+    frames = 10 if network.config.level == "high" else 4
     count, before = 0, channels
-    for after in config.encoder:
-        count += before * after * config.encoder_kernel + 3 * after
+    for after in config.encoder_channels:
+        count += before * after * config.encoder_kernel_size + 3 * after
         before = after
-    film = frames * before + vector + told
-    count += told * 4 * told + 4 * told + 4 * told * told + told
+    film = frames * before + vector + embedding
+    count += 8 * embedding * embedding + 5 * embedding
 
     def block(before, after):
-        convolutions = (before + after) * after * config.kernel + 2 * 3 * after
-        past = before * after + after if before != after else 0
-        return convolutions + film * 2 * after + 2 * after + past
+        convolutions = (before + after) * after * config.kernel_size + 2 * 3 * after
+        shortcut = before * after + after if before != after else 0
+        return convolutions + film * 2 * after + 2 * after + shortcut
 
     first, second, third = config.channels
     for before, after in ((width, first), (first, second), (second, third)):
@@ -56,18 +63,18 @@ def by_hand(stage):
     count += 2 * block(third, third)
     for before, after in ((third, second), (second, first)):
         count += block(2 * before, after) + block(after, after) + after * after * 4 + after
-    return count + first * first * config.kernel + 3 * first + first * width + width
+    return count + first * first * config.kernel_size + 3 * first + first * width + width
 
 
-def seen_widths(stage):
-    return 88 + len(stage.frames.middle), len(stage.vector.middle)
+def input_sizes(network):
+    return 88 + network.frame_features, network.vector_features
 
 
 @pytest.mark.parametrize("name", ["high-diff", "low-diff", "low-diff-res", "one-stage-diff"])
 def test_the_papers_size_has_as_many_parameters_as_table_7_makes(clips, name):
     with torch.device("meta"):  # shapes alone
-        stage, _ = a_stage(clips, name, "paper")
-    assert stage.parameters_learned == pytest.approx(by_hand(stage), rel=0.05)
+        network, _ = a_network(clips, name, "paper")
+    assert network.parameter_count == pytest.approx(by_hand(network), rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -75,35 +82,35 @@ def test_the_papers_size_has_as_many_parameters_as_table_7_makes(clips, name):
 )
 def test_with_codes_of_goals_it_has_as_many_as_the_results_say(clips, name, millions):
     with torch.device("meta"):
-        stage, _ = a_stage(clips, name, "paper", GoalEncoder())
-    assert stage.parameters_learned / 1e6 == pytest.approx(millions, abs=0.01)
+        network, _ = a_network(clips, name, "paper", GoalEncoder())
+    assert network.parameter_count / 1e6 == pytest.approx(millions, abs=0.01)
 
 
 @pytest.mark.parametrize("name", ["high-bet", "low-bet"])
 def test_so_has_a_transformer_as_table_8_makes(clips, name):
     with torch.device("meta"):
-        stage, _ = a_stage(clips, name, "paper")
-    (channels, vector), out = seen_widths(stage), len(stage.target.middle)
+        network, _ = a_network(clips, name, "paper")
+    (channels, vector), out = input_sizes(network), network.action_size
     wide, bins = 120, 64
     frames = (10 if name == "high-bet" else 4) + 1 + 4
     layer = 4 * wide * wide + 4 * wide + 8 * wide * wide + 5 * wide + 4 * wide
     count = (channels + vector + 2) * wide + frames * wide + 8 * layer + 2 * wide
     count += (wide + 1) * bins * (1 + out)
-    assert stage.parameters_learned == count
+    assert network.parameter_count == count
 
 
 def test_so_has_the_plain_network_of_appendix_g(clips):
     with torch.device("meta"):
-        stage, _ = a_stage(clips, "bc-mse", "paper")
-    given = 4 * 88 + seen_widths(stage)[1]
+        network, _ = a_network(clips, "bc-mse", "paper")
+    given = 4 * 88 + input_sizes(network)[1]
     count = (given + 1) * 1024 + 2 * 1025 * 1024 + 3 * 2 * 1024 + 1025 * 46
-    assert stage.parameters_learned == count
+    assert network.parameter_count == count
 
 
 @pytest.mark.parametrize("name", POLICIES)
 @pytest.mark.parametrize("size", ["small", "paper"])
 def test_the_configs_that_there_are_can_be_trained(name, size):
-    check_stage(policy_config(name, size))
+    assert policy_config(name, size).trainer.steps > 0
 
 
 @pytest.mark.parametrize(
@@ -114,15 +121,15 @@ def test_the_configs_that_there_are_can_be_trained(name, size):
         ("low-diff", "diffusion", {"channels": (20, 40)}),
         ("low-diff", "diffusion", {"channels": (8, 8, 8, 8)}),
         ("low-diff", "diffusion", {"channels": ()}),
-        ("low-diff", "diffusion", {"encoder": ()}),
-        ("low-diff", "diffusion", {"kernel": 4}),
-        ("low-diff", "diffusion", {"step_width": 7}),
-        ("low-diff", "diffusion", {"condition": (0,)}),
+        ("low-diff", "diffusion", {"encoder_channels": ()}),
+        ("low-diff", "diffusion", {"kernel_size": 4}),
+        ("low-diff", "diffusion", {"step_embedding": 7}),
+        ("low-diff", "diffusion", {"condition_layers": (0,)}),
         ("low-diff", "diffusion", {"steps": 1}),
         ("low-bet", "bet", {"heads": 7}),
         ("low-bet", "bet", {"bins": 1}),
         ("bc-mse", "mlp", {"hidden": (64, 0)}),
-        ("bc-mse", "fit", {"steps": 0}),
+        ("bc-mse", "trainer", {"steps": 0}),
         # What would do nothing.
         ("high-diff", None, {"target_noise": 0.1}),
         ("low-diff", None, {"hand_noise": 0.1}),
@@ -131,37 +138,38 @@ def test_the_configs_that_there_are_can_be_trained(name, size):
 )
 def test_settings_that_do_not_fit_are_refused(name, part, change):
     config = policy_config(name)
-    changed = change if part is None else {part: replace(getattr(config, part), **change)}
     with pytest.raises(InputError, match=r"must|levels|does nothing"):
-        check_stage(replace(config, **changed))
+        replace(
+            config, **change if part is None else {part: replace(getattr(config, part), **change)}
+        )
 
 
 @pytest.mark.parametrize("name", POLICIES)
-def test_what_is_said_has_the_shape_of_what_should_be(clips, name):
-    stage, sample = a_stage(clips, name)
-    stage.fit_scales(sample)
-    policy = torch_policy(stage, sampler=Sampler(2))
-    told = policy.say({key: sample[key] for key in SEEN}, np.random.default_rng(0))
-    assert told.shape == sample["target"].shape
-    assert np.isfinite(told).all()
+def test_actions_have_the_shape_of_the_target(clips, name):
+    network, sample = a_network(clips, name)
+    network.fit_normalizers(sample)
+    policy = torch_policy(network, sampler=Sampler(2))
+    action = policy.act({key: sample[key] for key in INPUTS}, np.random.default_rng(0))
+    assert action.shape == sample["target"].shape
+    assert np.isfinite(action).all()
 
 
 @pytest.mark.parametrize("coded", [False, True])
 @pytest.mark.parametrize("name", POLICIES)
-def test_onnx_says_what_torch_says(clips, name, coded, tmp_path):
-    stage, sample = a_stage(clips, name, encoder=GoalEncoder() if coded else None, diffusion=TINY)
-    stage.fit_scales(sample)
-    export_stage(stage, name, tmp_path / "stage.onnx")
+def test_onnx_acts_as_torch_does(clips, name, coded, tmp_path):
+    network, sample = a_network(clips, name, encoder=GoalEncoder() if coded else None, tiny=True)
+    network.fit_normalizers(sample)
+    export(network, name, tmp_path / "policy.onnx")
     # As precise as what is in the file.
-    for weight in stage.state_dict().values():
+    for weight in network.state_dict().values():
         if weight.numel() >= 1024:
             weight.copy_(weight.half().float())
-    given = {key: sample[key] for key in SEEN}
+    given = {key: sample[key] for key in INPUTS}
     ours, theirs = (
-        policy.say(given, np.random.default_rng(3))
+        policy.act(given, np.random.default_rng(3))
         for policy in (
-            load_policy(tmp_path / "stage.onnx", Sampler(3)),
-            torch_policy(stage, sampler=Sampler(3)),
+            load_policy(tmp_path / "policy.onnx", Sampler(3)),
+            torch_policy(network, sampler=Sampler(3)),
         )
     )
     np.testing.assert_allclose(ours, theirs, atol=2e-4)
@@ -180,21 +188,23 @@ def test_onnx_says_what_torch_says(clips, name, coded, tmp_path):
     ],
 )
 def test_it_learns_a_clip_by_heart(clips, name, steps):
-    stage, sample = a_stage(clips, name, diffusion=TINY)
-    stage.fit_scales(sample)
+    network, sample = a_network(clips, name, tiny=True)
+    network.fit_normalizers(sample)
     # A few frames, each with much noise of many kinds.
     sample = {key: np.repeat(value[::10], 10, axis=0) for key, value in sample.items()}
     batch = {key: torch.from_numpy(value) for key, value in sample.items()}
-    optimizer = torch.optim.AdamW(stage.net.parameters(), 3e-3)
-    stage.train()
+    optimizer = torch.optim.AdamW(network.net.parameters(), 3e-3)
+    network.train()
     for _ in range(steps):
-        loss = stage(batch)
+        loss = network(batch)
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-    told = torch_policy(stage).say({key: sample[key] for key in SEEN}, np.random.default_rng(0))
-    level, prior = stage.config.level, stage.config.prior
-    off = told - sample["target"] - base(level, prior, sample["vector"])
+    action = torch_policy(network).say(
+        {key: sample[key] for key in INPUTS}, np.random.default_rng(0)
+    )
+    level, residual = network.config.level, network.config.residual
+    off = action - sample["target"] - action_reference(level, residual, sample["vector"])
     assert np.abs(off).mean() < 0.3 * np.abs(sample["target"]).mean()
 
 
@@ -207,7 +217,7 @@ def test_what_is_beyond_the_frames_ahead_does_not_matter_to_the_encoder_of_anoth
 
 @pytest.mark.parametrize("frames", [1, 2, 4, 10])
 @pytest.mark.parametrize(("kernel", "stride"), [(1, 1), (3, 1), (5, 1), (3, 2)])
-def test_as_a_product_of_matrices_a_convolution_says_the_same(frames, kernel, stride):
+def test_as_a_matrix_product_a_convolution_is_the_same(frames, kernel, stride):
     ours = FrameConvolution(3, 6, kernel, frames, stride)
     theirs = torch.nn.Conv1d(3, 6, kernel, stride, kernel // 2)
     theirs.weight, theirs.bias = ours.weight, ours.bias
@@ -224,59 +234,61 @@ def test_so_does_one_that_doubles_the_frames(frames):
     torch.testing.assert_close(ours(x), theirs(x))
 
 
-def test_scales_are_taken_back():
-    scale = SaidScale(3)
+def test_normalized_actions_are_denormalized():
+    normalizer = AsinhNormalizer(3)
     values = np.random.default_rng(0).standard_t(2, (5000, 3)) * [1e-3, 0.1, 2.0]
-    scale.fit(values)
+    normalizer.fit(values)
     inside = torch.from_numpy(values[:200]).float()
-    scaled = scale(inside)
-    assert scaled.abs().max() <= 1
-    kept = scaled.abs() < 1
-    torch.testing.assert_close(scale.undo(scaled)[kept], inside[kept], rtol=1e-3, atol=1e-6)
+    normalized = normalizer(inside)
+    assert normalized.abs().max() <= 1
+    kept = normalized.abs() < 1
+    torch.testing.assert_close(
+        normalizer.denormalize(normalized)[kept], inside[kept], rtol=1e-3, atol=1e-6
+    )
 
 
 def test_what_hardly_ever_changes_does_no_harm(clips):
     """A key that is down in one sample of thousands."""
-    stage, sample = a_stage(clips, "low-diff")
+    network, sample = a_network(clips, "low-diff")
     many = {key: np.repeat(value, 100, axis=0) for key, value in sample.items()}
     many["vector"][:, -1] = 0.0
     many["vector"][0, -1] = 1.0
-    stage.fit_scales(many)
-    _, vector = stage.seen(*(torch.from_numpy(many[key]) for key in SEEN))
+    network.fit_normalizers(many)
+    _, vector = network.encode(*(torch.from_numpy(many[key]) for key in INPUTS))
     assert vector.abs().max() <= 8.0
 
 
 def test_columns_that_never_change_do_no_harm(clips):
-    stage, sample = a_stage(clips, "low-diff")
+    network, sample = a_network(clips, "low-diff")
     sample["vector"][:, -1] = 0.25
-    stage.fit_scales(sample)
+    network.fit_normalizers(sample)
     sample["vector"][:, -1] = 0.26
-    _, vector = stage.seen(*(torch.from_numpy(sample[key]) for key in SEEN))
+    _, vector = network.encode(*(torch.from_numpy(sample[key]) for key in INPUTS))
     assert vector[:, -1].abs().max() < 1
 
 
 @pytest.mark.parametrize("content", [b"", b"not a network", None])
-def test_a_file_that_is_no_stage_is_refused(clips, tmp_path, content):
-    path = tmp_path / "stage.onnx"
+def test_a_file_that_is_no_policy_is_refused(clips, tmp_path, content):
+    path = tmp_path / "policy.onnx"
     if content is None:
-        stage, _ = a_stage(clips, "bc-mse")
-        export_stage(stage, "bc-mse", path)
+        network, _ = a_network(clips, "bc-mse")
+        export(network, "bc-mse", path)
         content = path.read_bytes()[: path.stat().st_size // 2]
     path.write_bytes(content)
     with pytest.raises(InputError, match="damaged"):
         load_policy(path)
 
 
-def test_another_stage_under_its_name_is_refused(clips, tmp_path, monkeypatch):
+def test_another_policy_under_its_name_is_refused(clips, tmp_path, monkeypatch):
     monkeypatch.setenv(WEIGHTS, str(tmp_path))
-    stage, _ = a_stage(clips, "low-diff", diffusion=TINY)
+    network, _ = a_network(clips, "low-diff", tiny=True)
     for name in ("high-diff", "low-diff", "bc-mse", "fingers"):
-        export_stage(stage, "low-diff", tmp_path / f"{name}.onnx")
-    for player in ("two-stage-diff", "bc-mse", "fingers"):
-        with pytest.raises(InputError, match="holds the stage low-diff"):
-            Player.from_name(player)
+        export(network, "low-diff", tmp_path / f"{name}.onnx")
+    for player in ("two-network-diff", "bc-mse", "fingers"):
+        with pytest.raises(InputError, match="holds the policy low-diff"):
+            load_player(player)
 
 
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(InputError, match="does not exist"):
-        load_policy(tmp_path / "stage.onnx")
+        load_policy(tmp_path / "policy.onnx")

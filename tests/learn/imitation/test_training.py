@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pianomime import Player, cli
+from pianomime import cli, load_player
 from pianomime.errors import InputError
 from pianomime.learn.data.episode import COLUMNS, Episode
 from pianomime.learn.data.trajectories import write_expert_data
@@ -17,6 +17,7 @@ from pianomime.learn.imitation.trainer_config import TrainerConfig
 from pianomime.learn.imitation.training import train_policy
 from pianomime.plan.demonstration import Demonstration
 from pianomime.policies.methods import WEIGHTS
+from pianomime.progress import no_progress
 
 SHORT = TrainerConfig(steps=4, batch=8, warmup=1)
 NO_SDF = policy_config("high-diff-no-sdf")
@@ -46,13 +47,13 @@ def data(two_notes: Demonstration, tmp_path_factory: pytest.TempPathFactory) -> 
     columns["keys"] = columns["goal"].astype(np.float32)
     episodes = (Episode(str(number), 1.0, "ik", columns, number) for number in range(15))
     write_expert_data(folder / "experts.zarr", episodes)
-    config = GoalConfig(fit=replace(SHORT, bfloat16=False))
-    train_goal([songs], folder / "goal", config, lambda *_: None, lambda *_: None)
+    config = GoalConfig(trainer=replace(SHORT, bfloat16=False))
+    train_goal([songs], folder / "goal", config)
     return folder
 
 
 def train(name, data, out, **changes):
-    config = replace(policy_config(name), diffusion=TINY, fit=SHORT, **changes)
+    config = replace(policy_config(name), diffusion=TINY, trainer=SHORT, **changes)
     demos, experts = (data / "demos", []) if "high" in name else (None, [data / "experts.zarr"])
     return train_policy(name, config, out, demos, experts, data / "goal")
 
@@ -63,7 +64,7 @@ def test_what_was_trained_plays(data, two_notes, tmp_path, monkeypatch, low):
     for stage in ("high-diff", low):
         assert train(stage, data, tmp_path) == tmp_path / f"{stage}.onnx"
     monkeypatch.setenv(WEIGHTS, str(tmp_path))
-    player = Player.from_name("two-stage-diff-res" if low.endswith("res") else "two-stage-diff", 0)
+    player = load_player("two-stage-diff-res" if low.endswith("res") else "two-stage-diff", 0)
     first, again = (player.play(two_notes.score) for _ in range(2))
     assert np.isfinite(first.ctrl).all()
     np.testing.assert_array_equal(first.ctrl, again.ctrl)
@@ -71,7 +72,7 @@ def test_what_was_trained_plays(data, two_notes, tmp_path, monkeypatch, low):
 
 def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
     first = train("high-diff-no-sdf", data, tmp_path).read_bytes()
-    weights = tmp_path / "high-diff-no-sdf" / "weights.safetensors"
+    weights = tmp_path / "high-diff-no-sdf" / "result.safetensors"
     written = weights.stat().st_mtime_ns
     assert train("high-diff-no-sdf", data, tmp_path).read_bytes() == first
     assert weights.stat().st_mtime_ns == written
@@ -82,16 +83,16 @@ def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
 @pytest.mark.parametrize("stage", ["high-diff-no-sdf", "low-diff"])
 def test_a_stage_that_was_stopped_comes_to_the_same(data, tmp_path, stage):
     config = replace(
-        policy_config(stage), diffusion=TINY, fit=replace(SHORT, checkpoint_seconds=0.0)
+        policy_config(stage), diffusion=TINY, trainer=replace(SHORT, checkpoint_seconds=0.0)
     )
     demos, experts = (data / "demos", []) if "high" in stage else (None, [data / "experts.zarr"])
 
-    def stop(done, total, remark):
+    def stop(phase, done, total, remark=""):
         if done == 2:
             raise KeyboardInterrupt
 
-    def run(folder, tell=None):
-        return train_policy(stage, config, folder, demos, experts, data / "goal", tell)
+    def run(folder, progress=no_progress):
+        return train_policy(stage, config, folder, demos, experts, data / "goal", progress)
 
     whole = run(tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
@@ -101,9 +102,9 @@ def test_a_stage_that_was_stopped_comes_to_the_same(data, tmp_path, stage):
 
 def test_what_another_goal_encoder_trained_is_not_gone_on_with(data, tmp_path):
     train("high-diff", data, tmp_path)
-    config = GoalConfig(fit=replace(SHORT, bfloat16=False, seed=1))
-    train_goal([data / "songs"], tmp_path / "goal", config, lambda *_: None, lambda *_: None)
-    config = replace(policy_config("high-diff"), diffusion=TINY, fit=SHORT)
+    config = GoalConfig(trainer=replace(SHORT, bfloat16=False, seed=1))
+    train_goal([data / "songs"], tmp_path / "goal", config)
+    config = replace(policy_config("high-diff"), diffusion=TINY, trainer=SHORT)
     with pytest.raises(InputError, match="goal_encoder"):
         train_policy("high-diff", config, tmp_path, data / "demos", [], tmp_path / "goal")
 
@@ -111,7 +112,16 @@ def test_what_another_goal_encoder_trained_is_not_gone_on_with(data, tmp_path):
 def test_a_folder_of_the_name_of_another_stage(data, tmp_path, capsys):
     """The defaults are those of the stage that is named, wherever it stands."""
     experts, out = str(data / "experts.zarr"), str(tmp_path / "low-mse")
-    short = ["--fit.steps", "2", "--fit.batch", "4", "--fit.warmup", "0", "--mlp.hidden", "8"]
+    short = [
+        "--trainer.steps",
+        "2",
+        "--trainer.batch",
+        "4",
+        "--trainer.warmup",
+        "0",
+        "--mlp.hidden",
+        "8",
+    ]
     cli.main(["train", "bc-mse", "--experts", experts, "-o", out, *short])
     assert "bc-mse.onnx" in capsys.readouterr().out
     cli.main(["train", "-o", out, "bc-mse", "--experts", experts, *short])
@@ -121,7 +131,7 @@ def test_a_folder_of_the_name_of_another_stage(data, tmp_path, capsys):
 
 
 def test_what_is_missing_is_named(data, tmp_path):
-    config = replace(policy_config("high-diff"), fit=SHORT)
+    config = replace(policy_config("high-diff"), trainer=SHORT)
     with pytest.raises(InputError, match="--experts"):
         train_policy("high-diff", config, tmp_path, None, [], None)
     with pytest.raises(InputError, match="--experts"):
@@ -144,7 +154,7 @@ def test_experts_of_another_prior_are_refused(data, tmp_path):
     columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
     episodes = (Episode(f"{number}", 0.0, "dynamic", columns, number) for number in range(3))
     write_expert_data(tmp_path / "other.zarr", episodes)
-    config = replace(policy_config("low-diff-res"), diffusion=TINY, fit=SHORT)
+    config = replace(policy_config("low-diff-res"), diffusion=TINY, trainer=SHORT)
     with pytest.raises(InputError, match="prior dynamic"):
         train_policy(
             "low-diff-res", config, tmp_path, None, [tmp_path / "other.zarr"], data / "goal"

@@ -89,7 +89,8 @@ def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monk
     monkeypatch.setattr(RunFolder, "checkpoint", kept)
     train_sac([songs], tmp_path / "parts", config, 1)
     one, other = (
-        RunFolder.load(tmp_path / name / "multi-task-sac").result()[0] for name in ("whole", "parts")
+        RunFolder.load(tmp_path / name / "multi-task-sac").result()[0]
+        for name in ("whole", "parts")
     )
     for name, array in one.items():
         np.testing.assert_array_equal(array, other[name])

@@ -1,39 +1,33 @@
-"""How lessons are held. Cheap to import: no numpy, no torch."""
+"""Settings of data collection by DAgger. Cheap to import: no numpy, no torch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from pianomime.learn.runs.validation import within
+from pianomime.validation import within
 
 
 @dataclass(frozen=True)
 class DaggerConfig:
-    """How lessons are held."""
+    """Which policies play, and how much noise is on their controls."""
 
     noise: float = 0.2
-    """[rad] Most that is added to the controls of fingers by chance; each lesson has a share of it
-    of its own. Wrists and forearms get as much less as their moves carry fingers farther."""
-    smooth: float = 0.8
-    """Share of it that stays from one frame to the next."""
-    pilot: Path | None = None
-    """Low level (.onnx) whose controls are played; the teacher's if not given."""
-    planner: Path | None = None
-    """High level (.onnx) whose fingertips are shown; the human's if not given."""
-    most: int = 0
-    """Demonstrations, evenly taken from all; 0 for all."""
+    """Largest standard deviation [rad] of the noise on the controls of fingers; each episode has a
+    random share of it. Wrists and forearms have less, so that fingertips move about as far."""
+    noise_correlation: float = 0.8
+    """Correlation of the noise from one frame to the next."""
+    rollout_policy: Path | None = None
+    """Low-level policy (.onnx) whose controls are played; the expert's own if not given."""
+    fingertip_policy: Path | None = None
+    """High-level policy (.onnx) whose fingertips are followed; the human's if not given."""
+    max_demonstrations: int = 0
+    """Number of demonstrations to play, evenly spread over all; 0 for all."""
     seed: int = 0
-    """Of what is drawn."""
+    """Seed of the noise and of the policies' sampling."""
 
-
-def check_dagger(config: DaggerConfig) -> None:
-    """Refuse settings out of range.
-
-    Raises:
-        InputError: the first of them, as it is called on the command line.
-    """
-    within("noise", config.noise, 0, 1)
-    within("smooth", config.smooth, 0, 0.99)
-    for name in ("most", "seed"):
-        within(name, getattr(config, name), 0)
+    def __post_init__(self) -> None:
+        within("noise", self.noise, 0, 1)
+        within("noise_correlation", self.noise_correlation, 0, 0.99)
+        for name in ("max_demonstrations", "seed"):
+            within(name, getattr(self, name), 0)

@@ -1,4 +1,4 @@
-"""The data that generalists learn from: clips, one after the other, that no sample crosses."""
+"""Data sets that policies learn from: clips, one after the other, that no sample crosses."""
 
 from __future__ import annotations
 
@@ -15,26 +15,34 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.learn.data.published import read_published
-from pianomime.learn.data.trajectories import ExpertData
+from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.plan.demonstration import TRAIN, Demonstration
 
-HUMAN = ("goal", "fingertips")
-"""Columns of clips of humans."""
-EXPERT = (*HUMAN, "joints", "velocities", "keys", "prior", "action")
-"""Columns of clips of experts, as `pianomime.learn.data.episode.COLUMNS` describes them."""
-_HELD_OUT = 1 / 12
-"""Share of the songs that is kept from training, to see how well it generalises."""
+DEMONSTRATION_COLUMNS = ("goal", "fingertips")
+"""Columns of data sets made of demonstrations."""
+TRAJECTORY_COLUMNS = (
+    *DEMONSTRATION_COLUMNS,
+    "joints",
+    "velocities",
+    "keys",
+    "base_control",
+    "action",
+)
+"""Columns of data sets made of played trajectories; `pianomime.learn.data.episode.COLUMNS` says
+what they hold."""
+_VALIDATION_SHARE = 1 / 12
+"""Share of the songs that is kept for validation, about."""
 
 
 @dataclass(frozen=True, eq=False)
-class Clips:
-    """Frames of clips.
+class Dataset:
+    """Frames of clips, T in all.
 
     Attributes:
         columns: arrays (T, ...) by name.
         ends: (N,) one past the last frame of each clip.
         song: (N,) number that clips of one song share.
-        name: of each clip.
+        name: N names of the clips.
     """
 
     columns: dict[str, NDArray[Any]]
@@ -51,34 +59,35 @@ class Clips:
         """(N,) the first frame of each clip."""
         return np.concatenate(([0], self.ends[:-1]))
 
-    def some(self, which: NDArray[np.bool_]) -> Clips:
-        """The clips (N,) that are marked."""
-        rows = np.repeat(which, np.diff(self.ends, prepend=0))
-        return Clips(
+    def subset(self, mask: NDArray[np.bool_]) -> Dataset:
+        """The clips that a mask (N,) selects."""
+        lengths = np.diff(self.ends, prepend=0)
+        rows = np.repeat(mask, lengths)
+        return Dataset(
             {name: array[rows] for name, array in self.columns.items()},
-            np.cumsum(np.diff(self.ends, prepend=0)[which]),
-            self.song[which],
-            [name for name, kept in zip(self.name, which, strict=True) if kept],
+            np.cumsum(lengths[mask]),
+            self.song[mask],
+            [name for name, kept in zip(self.name, mask, strict=True) if kept],
         )
 
-    def fingerprint(self) -> str:
-        """Tells data from others."""
-        about = [self.name, self.ends.tolist(), self.song.tolist()]
-        digest = hashlib.sha256(json.dumps(about).encode())
+    def digest(self) -> str:
+        """Hash that identifies the data."""
+        description = [self.name, self.ends.tolist(), self.song.tolist()]
+        digest = hashlib.sha256(json.dumps(description).encode())
         for name in sorted(self.columns):
             digest.update(np.ascontiguousarray(self.columns[name]).data)
         return digest.hexdigest()[:16]
 
-    def split(self) -> tuple[Clips, Clips]:
-        """To learn from, and to see how well that went: no song is on both sides.
+    def split(self) -> tuple[Dataset, Dataset]:
+        """Training and validation sets, which have no song in common.
 
-        Which songs are kept does not depend on what else there is.
+        Which songs are kept for validation does not depend on what else is in the data set.
         """
-        held = _held(self.song)
-        return self.some(~held), self.some(held)
+        validation = _is_validation(self.song)
+        return self.subset(~validation), self.subset(validation)
 
 
-def read_human(source: Path) -> list[Demonstration]:
+def read_demonstrations(source: Path) -> list[Demonstration]:
     """Demonstrations to learn from: those of the split "train".
 
     Args:
@@ -99,59 +108,60 @@ def read_human(source: Path) -> list[Demonstration]:
     return found
 
 
-def held_out(clips: Sequence[Demonstration]) -> list[Demonstration]:
-    """The clips that are kept from training, as `Clips.split` keeps those of all data sets."""
-    kept = _held(np.array([_song(clip.song, clip.score.title) for clip in clips]))
-    return [clip for clip, one in zip(clips, kept, strict=True) if one]
+def validation_demonstrations(demonstrations: Sequence[Demonstration]) -> list[Demonstration]:
+    """The demonstrations of songs that `Dataset.split` keeps for validation."""
+    songs = np.array([_song_number(one.song, one.score.title) for one in demonstrations])
+    mask = _is_validation(songs)
+    return [one for one, kept in zip(demonstrations, mask, strict=True) if kept]
 
 
-def _held(song: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _is_validation(song: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Songs whose number's hash is low: at least one of them, and not all."""
     songs = np.unique(song)
     place = np.array([zlib.crc32(str(number).encode()) / 2**32 for number in songs])
-    held = ((place < _HELD_OUT) | (place == place.min())) & (place < place.max())
-    return np.isin(song, songs[held])
+    kept = ((place < _VALIDATION_SHARE) | (place == place.min())) & (place < place.max())
+    return np.isin(song, songs[kept])
 
 
-def _song(number: int, title: str) -> int:
-    """The number of a song; where nobody knows it, clips of one title are of one song."""
+def _song_number(number: int, title: str) -> int:
+    """The number of a song; where it is unknown, clips of one title count as one song."""
     return number if number >= 0 else zlib.crc32(title.encode())
 
 
-def human_clips(source: Path) -> Clips:
-    """How humans play, see `read_human`.
+def demonstration_dataset(source: Path) -> Dataset:
+    """Goals and fingertips of demonstrations, see `read_demonstrations`.
 
     Raises:
         OSError: there is no such file.
         InputError: it holds no demonstrations, or values that are not finite.
     """
-    return _together(
+    return _concatenate(
         source,
         (
             (
-                clip.score.title,
-                _song(clip.song, clip.score.title),
+                one.score.title,
+                _song_number(one.song, one.score.title),
                 {
-                    "goal": clip.score.roll(),
-                    "fingertips": clip.plan.fingertips.astype(np.float32),
+                    "goal": one.score.roll(),
+                    "fingertips": one.plan.fingertips.astype(np.float32),
                 },
             )
-            for clip in read_human(source)
+            for one in read_demonstrations(source)
         ),
     )
 
 
-def expert_clips(
-    sources: Sequence[Path], columns: Sequence[str] = EXPERT, prior: str = ""
-) -> Clips:
-    """How experts play, or teachers would: the episodes of data sets that are for training.
+def trajectory_dataset(
+    sources: Sequence[Path], columns: Sequence[str] = TRAJECTORY_COLUMNS, base: str = ""
+) -> Dataset:
+    """Training episodes of trajectory data sets, of experts or of DAgger.
 
-    Episodes of different data sets are of one song where these tell the same number, or name.
+    Episodes of different data sets count as one song if these give it the same number, or name.
 
     Args:
-        sources: data sets.
-        columns: which.
-        prior: the prior that all must have been recorded with, if that matters.
+        sources: the data sets.
+        columns: which columns to read.
+        base: the base controller that all must have been recorded with, if that matters.
 
     Raises:
         InputError: a data set is not there or cannot be used, or values in it are not finite.
@@ -159,21 +169,23 @@ def expert_clips(
 
     def clips() -> Iterator[tuple[str, int, dict[str, NDArray[Any]]]]:
         for source in sources:
-            data = ExpertData.open(source)
-            for number, about in enumerate(data.episodes):
-                if about["split"] == TRAIN:
-                    if prior not in ("", about["prior"]):
+            data = TrajectoryData.open(source)
+            for number, episode in enumerate(data.episodes):
+                if episode["split"] == TRAIN:
+                    if base not in ("", episode["base"]):
                         raise InputError(
-                            f"{source}: {about['name']} was played on the prior {about['prior']}; "
-                            f"this stage is played on {prior}"
+                            f"{source}: {episode['name']} has the base controller "
+                            f"{episode['base']}; this policy needs {base}"
                         )
-                    song = _song(about["song"], about["name"])
-                    yield about["name"], song, data.columns(number, columns)
+                    song = _song_number(episode["song"], episode["name"])
+                    yield episode["name"], song, data.columns(number, columns)
 
-    return _together(", ".join(map(str, sources)), clips())
+    return _concatenate(", ".join(map(str, sources)), clips())
 
 
-def _together(source: object, clips: Iterable[tuple[str, int, dict[str, NDArray[Any]]]]) -> Clips:
+def _concatenate(
+    source: object, clips: Iterable[tuple[str, int, dict[str, NDArray[Any]]]]
+) -> Dataset:
     names, songs, columns = [], [], []
     for name, song, arrays in clips:
         for column, array in arrays.items():
@@ -185,7 +197,7 @@ def _together(source: object, clips: Iterable[tuple[str, int, dict[str, NDArray[
     if not names:
         raise InputError(f"{source}: holds nothing to train on")
     ends = np.cumsum([len(arrays["goal"]) for arrays in columns])
-    together = {
+    concatenated = {
         column: np.concatenate([arrays[column] for arrays in columns]) for column in columns[0]
     }
-    return Clips(together, ends, np.array(songs), names)
+    return Dataset(concatenated, ends, np.array(songs), names)

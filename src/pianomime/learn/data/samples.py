@@ -1,4 +1,4 @@
-"""Samples of clips: what a network is given in one frame, and what it should have said."""
+"""Training samples of a data set: the observation in one frame, and the action chunk to learn."""
 
 from __future__ import annotations
 
@@ -10,179 +10,189 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import KEYS
-from pianomime.learn.data.clips import Clips
+from pianomime.learn.data.dataset import Dataset
 from pianomime.learn.imitation.config import PolicyConfig
 from pianomime.policies.features import (
-    TIPS,
-    Arrays,
-    base,
-    from_wrists,
-    high_inputs,
-    low_inputs,
-    octave,
-    rest_tips,
+    OCTAVE,
+    Observation,
+    action_reference,
+    fingertip_observation,
+    octave_width,
+    relative_to_wrist,
+    rest_points,
+    tracking_observation,
 )
-from pianomime.policies.horizon import CHUNK, HIGH_GOALS
+from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
 from pianomime.world.hand import both_hands, hand_points
-from pianomime.world.layout import LAYOUT
+from pianomime.world.layout import LAYOUT, POINT_COUNT, POINTS_SIZE
 
-_OCTAVE = 12
-_SLIDES = (0, LAYOUT.hand_joints)
+_BOTH_POINTS = 2 * POINT_COUNT
+_SLIDES = tuple(LAYOUT.among_hands(hand).start + LAYOUT.slide for hand in (1, 0))
 """Joints that carry the forearms along the keyboard, right and left; y rises as they do."""
-_SLIDE_CONTROLS = (20, 43)
+_SLIDE_CONTROLS = tuple(
+    LAYOUT.actuators[hand].start + LAYOUT.slide_actuators.start for hand in (1, 0)
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
-    """Draws samples.
+class Samples:
+    """Samples of a data set for one policy; one can begin at each of its T frames.
 
     Attributes:
-        clips: from what.
-        config: for which stage.
-        tips: (T, 2, 6, 3) where the points were before each frame [m]: those of the joints, or of
-            the frame before.
+        dataset: where they are from.
+        config: of the policy.
+        points: (T, 2, 6, 3) present points in each frame [m]: those of the joints, or for high
+            levels the fingertips of the frame before.
     """
 
-    clips: Clips
+    dataset: Dataset
     config: PolicyConfig
-    tips: NDArray[np.float32]
+    points: NDArray[np.float32]
 
     @classmethod
-    def of(cls, clips: Clips, config: PolicyConfig) -> Windows:
-        """Prepare samples of clips for a stage."""
+    def of(cls, dataset: Dataset, config: PolicyConfig) -> Samples:
+        """Prepare the samples of a data set for a policy."""
         if config.level == "high":
-            tips = np.roll(clips.columns["fingertips"], 1, axis=0)
-            tips[clips.starts] = rest_tips()
+            points = np.roll(dataset.columns["fingertips"], 1, axis=0)
+            points[dataset.starts] = rest_points()
         else:
-            tips = hand_points(clips.columns["joints"])
-        return cls(clips, config, tips.astype(np.float32))
+            points = hand_points(dataset.columns["joints"])
+        return cls(dataset, config, points.astype(np.float32))
 
     def __len__(self) -> int:
-        """Number of samples: one a frame."""
-        return int(self.clips.ends[-1])
+        """Number of samples: one for each frame."""
+        return int(self.dataset.ends[-1])
 
-    def draw(self, draw: np.random.Generator, batch: int) -> Arrays:
-        """Samples by chance: each frame alike often, in a key by chance where that is asked for."""
-        rows = draw.integers(0, len(self), batch)
-        shift = draw.integers(-1, 2, batch) if self.config.transpose else np.zeros(batch, np.int64)
-        sample = self._absolute(rows, shift)
+    def draw(self, rng: np.random.Generator, batch: int) -> Observation:
+        """A random batch with augmentation: octave shifts and noise as the config has them."""
+        rows = rng.integers(0, len(self), batch)
+        octaves = rng.integers(-1, 2, batch) if self.config.transpose else np.zeros(batch, np.int64)
+        sample = self._absolute(rows, octaves)
         if self.config.level == "high":
-            noise = draw.normal(0.0, self.config.tip_noise, (batch, 2, 6, 3))
-            noise[:, :, 0, 1] += draw.normal(0.0, self.config.hand_noise, (batch, 2))
-            sample["vector"] += noise.reshape(batch, TIPS).astype(np.float32)
+            noise = rng.normal(0.0, self.config.tip_noise, (batch, 2, POINT_COUNT, 3))
+            noise[:, :, 0, 1] += rng.normal(0.0, self.config.hand_noise, (batch, 2))
+            sample["vector"] += noise.reshape(batch, POINTS_SIZE).astype(np.float32)
         elif self.config.level == "low":
-            # Alike in all frames of a chunk, and in where they are and how far that is off.
-            noise = draw.normal(0.0, self.config.target_noise, (batch, 1, 1, 12, 3))
-            frames = sample["frames"].reshape(batch, CHUNK, 2, 12, 3)
+            # The same in all frames of a chunk, and in targets and tracking errors. Fingertips that
+            # press, at z = 0, have none.
+            noise = rng.normal(0.0, self.config.target_noise, (batch, 1, 1, _BOTH_POINTS, 3))
+            frames = sample["frames"].reshape(batch, CHUNK, 2, _BOTH_POINTS, 3)
             noise = noise * (frames[:, :, :1, :, 2:] > 0.0) * [1.0, 1.0, 0.0]
             sample["frames"] = (frames + noise).reshape(batch, CHUNK, -1).astype(np.float32)
         return self._relative(sample)
 
-    def some(self, number: int) -> Arrays:
-        """So many samples, evenly spread, as they are."""
+    def evenly(self, number: int) -> Observation:
+        """So many samples, evenly spread over all, without augmentation."""
         rows = np.linspace(0, len(self) - 1, min(number, len(self))).astype(np.int64)
-        return self.sample(rows, np.zeros(len(rows), np.int64))
+        return self.at(rows, np.zeros(len(rows), np.int64))
 
-    def sample(self, rows: NDArray[np.int64], octaves: NDArray[np.int64]) -> Arrays:
-        """What is given in frames (B,), and as `target` (B, T, D) what should be said.
+    def at(self, rows: NDArray[np.int64], octaves: NDArray[np.int64]) -> Observation:
+        """Observations in frames (B,), and as `target` (B, T, D) the actions to learn.
 
-        The target is relative to `base`. Beyond the end of a clip its last frame is held, and its
-        goals are silence.
+        The target is relative to `action_reference`. Beyond the end of a clip its last frame is
+        held, and its goals are silence.
 
         Args:
             rows: (B,) frames.
-            octaves: (B,) by how many everything is moved up; where that leads off the keyboard, or
-                controls beyond what the forearms can reach, it stays.
+            octaves: (B,) by how many octaves to move the sample up. It stays where it is if that
+                leads off the keyboard, or to controls beyond the reach of the forearms.
         """
         return self._relative(self._absolute(rows, octaves))
 
-    def _relative(self, sample: Arrays) -> Arrays:
+    def _relative(self, sample: Observation) -> Observation:
         config = self.config
-        target = sample["target"] - base(config.level, config.prior, sample["vector"])
+        reference = action_reference(config.level, config.residual, sample["vector"])
+        target = sample["target"] - reference
         return {**sample, "target": target[:, : config.chunk].astype(np.float32)}
 
-    def _absolute(self, rows: NDArray[np.int64], octaves: NDArray[np.int64]) -> Arrays:
-        """As `sample`, with a target that is not relative to anything."""
-        columns, config = self.clips.columns, self.config
-        end = self.clips.ends[np.searchsorted(self.clips.ends, rows, side="right")]
-        ahead = rows[:, None] + np.arange(HIGH_GOALS if config.level == "high" else CHUNK)
+    def _absolute(self, rows: NDArray[np.int64], octaves: NDArray[np.int64]) -> Observation:
+        """As `at`, with a target that is not relative to anything."""
+        columns, config = self.dataset.columns, self.config
+        end = self.dataset.ends[np.searchsorted(self.dataset.ends, rows, side="right")]
+        ahead = rows[:, None] + np.arange(GOAL_HORIZON if config.level == "high" else CHUNK)
         inside = ahead < end[:, None]
         goal = columns["goal"][np.minimum(ahead, end[:, None] - 1)] & inside[..., None]
         chunk = np.minimum(rows[:, None] + np.arange(CHUNK), end[:, None] - 1)
         targets = columns["fingertips"][chunk]
-        octaves = self._possible(rows, goal, octaves)
-        off = (octaves * octave()).astype(np.float32)
-        goal = _moved(goal, octaves)
-        targets = targets + _along(off)[:, None]
-        tips = self.tips[rows] + _along(off)
+        octaves = self._feasible(rows, goal, octaves)
+        shift = (octaves * octave_width()).astype(np.float32)
+        goal = _transpose(goal, octaves)
+        targets = targets + _along_keyboard(shift)[:, None]
+        points = self.points[rows] + _along_keyboard(shift)
         if config.level == "high":
-            told = from_wrists(targets).reshape(len(rows), CHUNK, TIPS)
-            return {**high_inputs(goal, tips), "target": told}
-        joints, prior, action = columns["joints"][rows], None, columns["action"][chunk]
-        joints = _slid(joints, off, _SLIDES)
-        action = _slid(action, off, _SLIDE_CONTROLS)
-        if config.prior:
-            priors = _slid(columns["prior"][chunk], off, _SLIDE_CONTROLS)
-            prior, action = priors[:, 0], action - priors
-        sample = low_inputs(
+            target = relative_to_wrist(targets).reshape(len(rows), CHUNK, POINTS_SIZE)
+            return {**fingertip_observation(goal, points), "target": target}
+        joints, base, action = columns["joints"][rows], None, columns["action"][chunk]
+        joints = _slide(joints, shift, _SLIDES)
+        action = _slide(action, shift, _SLIDE_CONTROLS)
+        if config.residual:
+            base_control = _slide(columns["base_control"][chunk], shift, _SLIDE_CONTROLS)
+            base, action = base_control[:, 0], action - base_control
+        observation = tracking_observation(
             goal,
             targets if config.level == "low" else None,
-            tips,
+            points,
             joints,
             columns["velocities"][rows],
-            _moved(columns["keys"][rows], octaves),
-            prior,
+            _transpose(columns["keys"][rows], octaves),
+            base,
         )
-        return {**sample, "target": action}
+        return {**observation, "target": action}
 
-    def _possible(
+    def _feasible(
         self, rows: NDArray[np.int64], goal: NDArray[np.bool_], octaves: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         """The octaves (B,) by which each sample can be moved."""
         used = np.asarray(goal.any(axis=1))
         if self.config.level != "high":
-            used = used | (self.clips.columns["keys"][rows] > 0)
-        low, high = used[:, :_OCTAVE].any(axis=1), used[:, KEYS - _OCTAVE :].any(axis=1)
-        off_keys = np.where(octaves < 0, low, high)
-        beyond = np.zeros(len(rows), bool)
+            used = used | (self.dataset.columns["keys"][rows] > 0)
+        low, high = used[:, :OCTAVE].any(axis=1), used[:, KEYS - OCTAVE :].any(axis=1)
+        off_keyboard = np.where(octaves < 0, low, high)
+        out_of_reach = np.zeros(len(rows), bool)
         if self.config.level != "high":
-            low_end, high_end = _slide_ends()
-            action = _slid(self.clips.columns["action"][rows], octaves * octave(), _SLIDE_CONTROLS)
-            slides = action[:, _SLIDE_CONTROLS]
-            beyond |= ((slides < low_end) | (slides > high_end)).any(axis=1)
-        return np.where(off_keys | beyond, 0, octaves)
+            low_end, high_end = _slide_range()
+            action = self.dataset.columns["action"][rows]
+            slides = _slide(action, octaves * octave_width(), _SLIDE_CONTROLS)[:, _SLIDE_CONTROLS]
+            out_of_reach |= ((slides < low_end) | (slides > high_end)).any(axis=1)
+        return np.where(off_keyboard | out_of_reach, 0, octaves)
 
 
 @cache
-def _slide_ends() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(2,) least and most of the controls that carry the forearms along [m]."""
+def _slide_range() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(2,) lowest and highest controls of the slides along the keyboard, right and left [m]."""
+    slide = LAYOUT.slide_actuators.start
     hands = both_hands()[::-1]
-    low, high = (
-        np.array([getattr(hand, end)[_SLIDE_CONTROLS[0]] for hand in hands])
-        for end in ("ctrl_low", "ctrl_high")
+    return (
+        np.array([hand.ctrl_low[slide] for hand in hands]),
+        np.array([hand.ctrl_high[slide] for hand in hands]),
     )
-    return low, high
 
 
-def _moved(keys: NDArray[Any], octaves: NDArray[np.int64]) -> NDArray[Any]:
-    """Keys (B, ..., 88) of each sample, moved by octaves (B,)."""
+def _transpose(keys: NDArray[Any], octaves: NDArray[np.int64]) -> NDArray[Any]:
+    """Keys (B, ..., 88) of each sample, moved up by octaves (B,)."""
     moved = keys.copy()
-    for octave_count in np.unique(octaves[octaves != 0]):
-        which = octaves == octave_count
-        moved[which] = np.roll(keys[which], octave_count * _OCTAVE, axis=-1)
+    for number in np.unique(octaves[octaves != 0]):
+        which = octaves == number
+        moved[which] = np.roll(keys[which], number * OCTAVE, axis=-1)
     return moved
 
 
-def _along(off: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(B, 1, 1, 3) that moves points by (B,) along the keyboard [m]."""
-    return off[:, None, None, None] * np.array([0, 1, 0], np.float32)
+def _along_keyboard(shift: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(B, 1, 1, 3) vectors of length (B,) along the keyboard, y [m]."""
+    return shift[:, None, None, None] * np.array([0, 1, 0], np.float32)
 
 
-def _slid(
-    values: NDArray[np.float32], off: NDArray[np.floating], slides: tuple[int, int]
+def _slide(
+    values: NDArray[np.float32], shift: NDArray[np.floating], slides: tuple[int, ...]
 ) -> NDArray[np.float32]:
-    """Joints or controls (B, ..., D) of forearms that are moved along the keyboard by (B,) [m]."""
+    """Joints or controls (B, ..., D) with the forearms moved along the keyboard by (B,) [m].
+
+    Args:
+        values: joints or controls of both hands.
+        shift: (B,) how far.
+        slides: places of both slides among these.
+    """
     moved = values.copy()
     for slide in slides:
-        moved[..., slide] += off.reshape(-1, *[1] * (values.ndim - 2))
+        moved[..., slide] += shift.reshape(-1, *[1] * (values.ndim - 2))
     return moved

@@ -1,4 +1,4 @@
-"""The expert data set: episodes one after the other, in zarr 3.
+"""The data set of trajectories: episodes one after the other, in zarr 3.
 
 Read it with no more than zarr:
 
@@ -9,8 +9,8 @@ Read it with no more than zarr:
     for first, end in zip([0, *ends], ends):
         joints, action = data["joints"][first:end], data["action"][first:end]
 
-Every array's attribute `about` says what it holds; the group's attribute `episodes` has the name,
-the F1, the prior, the song and the split of each episode.
+The attribute `description` of every array says what it holds; the attribute `episodes` of the group
+has the name, the F1, the base controller, the song and the split of each episode.
 """
 
 from __future__ import annotations
@@ -31,27 +31,29 @@ from pianomime.errors import InputError
 from pianomime.learn.data.episode import COLUMNS, Episode
 
 FORMAT = "pianomime experts"
-VERSION = 2
+VERSION = 3
 _CHUNK = 4096
-_TOLD = {"name", "f1", "prior", "song", "split"}
+"""Rows in a chunk of the file."""
+_EPISODE = {"name", "f1", "base", "song", "split"}
+"""What is recorded of each episode."""
 
 
-def write_expert_data(path: Path, episodes: Iterator[Episode]) -> int:
+def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
     """Write episodes, all or nothing; an older data set at the same place is replaced.
 
     Args:
-        path: where to, a folder that is not there yet or a data set.
-        episodes: what to.
+        path: of the data set, a folder.
+        episodes: what to write.
 
     Returns:
-        How many.
+        Number of episodes.
 
     Raises:
         InputError: there is something else at the place, or there are no episodes.
         OSError: it cannot be written.
     """
     if path.exists():
-        ExpertData.open(path)
+        TrajectoryData.open(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:
         fresh = Path(folder, path.name)
@@ -63,27 +65,27 @@ def write_expert_data(path: Path, episodes: Iterator[Episode]) -> int:
                 dtype=column.dtype,
                 chunks=(_CHUNK, *column.shape),
             )
-            array.attrs["about"] = column.about
+            array.attrs["description"] = column.description
         ends = [0]
-        about: list[Any] = []
+        rows: list[Any] = []
         for episode in episodes:
             for name in COLUMNS:
                 _array(group, name).append(episode.columns[name])
             ends.append(ends[-1] + len(episode.columns["goal"]))
-            about.append(
+            rows.append(
                 {
                     "name": episode.name,
                     "f1": episode.f1,
-                    "prior": episode.prior_name,
+                    "base": episode.base,
                     "song": episode.song,
                     "split": episode.split,
                 }
             )
-        if not about:
+        if not rows:
             raise InputError("there are no episodes to collect")
-        marks = group.create_array("episode_end", data=np.array(ends[1:], np.int64))
-        marks.attrs["about"] = "one past the last row of each episode"
-        group.attrs.update({"format": FORMAT, "version": VERSION, "episodes": about})
+        end_array = group.create_array("episode_end", data=np.array(ends[1:], np.int64))
+        end_array.attrs["description"] = "one past the last row of each episode"
+        group.attrs.update({"format": FORMAT, "version": VERSION, "episodes": rows})
         older = Path(folder, "older")
         if path.exists():
             os.replace(path, older)
@@ -94,17 +96,17 @@ def write_expert_data(path: Path, episodes: Iterator[Episode]) -> int:
                 os.replace(older, path)
             raise
         shutil.rmtree(older, ignore_errors=True)
-    return len(about)
+    return len(rows)
 
 
 @dataclass(frozen=True, eq=False)
-class ExpertData:
-    """A data set, read where it lies.
+class TrajectoryData:
+    """A data set on disk.
 
     Attributes:
         group: the zarr group.
         ends: (E,) one past the last row of each episode.
-        episodes: name, f1, prior, song and split of each, see `Episode`.
+        episodes: name, f1, base, song and split of each, see `Episode`.
     """
 
     group: zarr.Group
@@ -112,8 +114,8 @@ class ExpertData:
     episodes: list[dict[str, Any]]
 
     @classmethod
-    def open(cls, path: Path) -> ExpertData:
-        """A data set that is there.
+    def open(cls, path: Path) -> TrajectoryData:
+        """Open a data set for reading.
 
         Raises:
             InputError: there is none, or one of another version or shape.
@@ -123,13 +125,13 @@ class ExpertData:
             attributes = dict(group.attrs)
         # A damaged store raises what its codecs and its metadata happen to raise.
         except (OSError, LookupError, ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"{path}: not an expert data set") from error
+            raise InputError(f"{path}: not a data set of trajectories") from error
         if attributes.get("format") != FORMAT:
-            raise InputError(f"{path}: not an expert data set")
+            raise InputError(f"{path}: not a data set of trajectories")
         if attributes.get("version") != VERSION:
             raise InputError(
-                f"{path}: an expert data set of version {attributes.get('version')}; "
-                f"this program reads {VERSION}"
+                f"{path}: a data set of version {attributes.get('version')}; this program reads "
+                f"{VERSION}: collect it again"
             )
         try:
             ends = np.asarray(_array(group, "episode_end")[:])
@@ -144,9 +146,9 @@ class ExpertData:
                 raise InputError(f"{path}: {name} has another shape")
         episodes: Any = attributes.get("episodes")
         if not isinstance(episodes, list) or len(episodes) != len(ends):
-            raise InputError(f"{path}: damaged, it does not tell of each episode")
-        if not all(isinstance(one, dict) and one.keys() >= _TOLD for one in episodes):
-            raise InputError(f"{path}: damaged, it does not tell all of each episode")
+            raise InputError(f"{path}: damaged, it does not describe each episode")
+        if not all(isinstance(one, dict) and one.keys() >= _EPISODE for one in episodes):
+            raise InputError(f"{path}: damaged, it lacks facts about its episodes")
         return cls(group, ends, episodes)
 
     def __len__(self) -> int:
@@ -169,14 +171,14 @@ class ExpertData:
 
     def episode(self, number: int) -> Episode:
         """One episode, in memory."""
-        about = self.episodes[number]
+        facts = self.episodes[number]
         return Episode(
-            about["name"],
-            about["f1"],
-            about["prior"],
+            facts["name"],
+            facts["f1"],
+            facts["base"],
             self.columns(number, COLUMNS),
-            about["song"],
-            about["split"],
+            facts["song"],
+            facts["split"],
         )
 
 

@@ -1,1 +1,1 @@
-"""How the residual that all fingers share is learned, on many songs at once."""
+"""Training of the finger residual: one policy for all fingers, by PPO on many songs."""

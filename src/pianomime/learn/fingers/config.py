@@ -1,67 +1,61 @@
-"""How the residual of fingers is learned. Cheap to import: no numpy, no torch."""
+"""Settings of the finger residual's training. Cheap to import: no torch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from pianomime.errors import InputError
-from pianomime.learn.runs.validation import above_zero, within
+from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.validation import above_zero, within
 
 
 @dataclass(frozen=True)
 class FingersConfig:
-    """Proximal policy optimisation of ten fingers in many songs."""
+    """Proximal policy optimisation (Schulman et al., 2017) of ten fingers, in many songs."""
 
-    frames: int = 400_000
-    """Frames that are played, in all worlds together; each has ten fingers."""
-    worlds: int = 32
-    """Songs played side by side."""
-    frames_per_update: int = 2048
-    """Frames between updates, in all worlds together."""
-    batch: int = 2048
-    """Fingers in a minibatch."""
-    epochs: int = 4
-    """Passes over the frames of an update."""
+    total_steps: int = 400_000
+    """Control steps in all environments together; each has ten fingers."""
+    num_envs: int = 32
+    """Number of songs that are played side by side."""
+    steps_per_update: int = 2048
+    """Control steps between updates, in all environments together."""
+    batch_size: int = 2048
+    """Samples in a minibatch; each finger is one."""
+    n_epochs: int = 4
+    """Passes over the collected samples in each update."""
     learning_rate: float = 5e-4
-    """At the start; it falls to 0 at the end."""
+    """Learning rate at the start; it falls linearly to 0."""
     hidden: tuple[int, ...] = (128, 128)
-    """Width of each hidden layer, of the actor and of the critic."""
-    discount: float = 0.8
-    """Of rewards, from frame to frame: what a finger does is seen soon."""
-    gae: float = 0.9
-    """Lambda of the generalised advantage estimate."""
-    noise: float = 0.3
-    """Standard deviation of actions at the start."""
-    effort: float = 0.02
-    """Reward that a finger loses for its actions, all at their ends."""
-    wrong: float = 1.0
-    """Reward that it loses for a key that it presses and nobody wants; one that it should press
-    and does has 1."""
-    seconds: float = 30.0
-    """Of each song, at most [s]."""
+    """Widths of the hidden layers, in the actor and in the critic."""
+    gamma: float = 0.8
+    """Discount factor of the rewards per control step; a finger's actions have effect soon."""
+    gae_lambda: float = 0.9
+    """Lambda of the generalised advantage estimate (Schulman et al., 2016)."""
+    action_std: float = 0.3
+    """Standard deviation of the actions at the start."""
+    action_cost: float = 0.02
+    """Reward lost for actions that are all at their limits; quadratic in the action."""
+    wrong_key_cost: float = 1.0
+    """Reward lost for a pressed key that is not in the goal; an own key that is pressed earns 1."""
+    seconds: float = EXCERPT_SECONDS
+    """Longest excerpt of each song [s]."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Seed of all random numbers."""
 
-
-def check_fingers(config: FingersConfig) -> None:
-    """Refuse settings out of range.
-
-    Raises:
-        InputError: the first of them, as it is called on the command line.
-    """
-    for name in ("frames", "worlds", "frames_per_update", "epochs"):
-        within(name, getattr(config, name), 1)
-    within("batch", config.batch, 2)
-    for name in ("learning_rate", "noise", "seconds"):
-        above_zero(name, getattr(config, name))
-    for name in ("discount", "gae"):
-        within(name, getattr(config, name), 0, 1)
-    for name in ("effort", "wrong", "seed"):
-        within(name, getattr(config, name), 0)
-    for width in config.hidden:
-        within("hidden", width, 1)
-    if config.frames_per_update % config.worlds:
-        raise InputError(
-            f"frames-per-update ({config.frames_per_update}) must be a multiple of worlds "
-            f"({config.worlds})"
-        )
+    def __post_init__(self) -> None:
+        for name in ("total_steps", "num_envs", "steps_per_update", "n_epochs"):
+            within(name, getattr(self, name), 1)
+        within("batch_size", self.batch_size, 2)
+        for name in ("learning_rate", "action_std", "seconds"):
+            above_zero(name, getattr(self, name))
+        for name in ("gamma", "gae_lambda"):
+            within(name, getattr(self, name), 0, 1)
+        for name in ("action_cost", "wrong_key_cost", "seed"):
+            within(name, getattr(self, name), 0)
+        for width in self.hidden:
+            within("hidden", width, 1)
+        if self.steps_per_update % self.num_envs:
+            raise InputError(
+                f"steps-per-update ({self.steps_per_update}) must be a multiple of num-envs "
+                f"({self.num_envs})"
+            )

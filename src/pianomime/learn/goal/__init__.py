@@ -1,1 +1,1 @@
-"""The goal autoencoder: from the keys that should be down to 16 numbers (paper, appendix E)."""
+"""Goal autoencoder: the keys that should be down as a code of 16 numbers (paper, appendix E)."""

@@ -1,8 +1,8 @@
 """The networks of the goal autoencoder (paper, appendix E, figure 7).
 
-The encoder is the paper's: four convolutions and a linear layer. It does not say how they are
-normalised; the published code does it over the batch, and was used in a way that made a code depend
-on what else was in the batch. Here each goal is normalised by itself, so there is no such thing.
+The encoder is the paper's: four convolutions and a linear layer. The paper does not say how they
+are normalized. The published code has batch normalization, and was used so that a code depended on
+the other goals in its batch; here each goal is normalized by itself.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from pianomime.keyboard import KEYS
 from pianomime.learn.goal.sdf import QUERY_HIGH, QUERY_LOW
 
 CODE = 16
-"""Numbers in a code."""
+"""Size of a code."""
 FILTERS = (2, 4, 8, 16)
 HIDDEN = 16
-"""Width of the decoder's layers."""
+"""Width of the decoder's hidden layers."""
 
 
 class GoalEncoder(nn.Module):
-    """From goals to codes, 2152 weights.
+    """From goals to codes; 2152 parameters.
 
-    Each number of a code has mean 0 and variance 1 over the goals on which it was trained, once
-    `standardise` was called.
+    Once `standardize` was called, each number of a code has mean 0 and variance 1 over the training
+    goals.
 
     Attributes:
-        mean, scale: (16,) by which what the last layer gives becomes a code.
+        mean, scale: (16,) mean and standard deviation of the last layer's output.
     """
 
     mean: Tensor
@@ -55,21 +55,23 @@ class GoalEncoder(nn.Module):
         return code.reshape(*goal.shape[:-1], CODE)
 
     @torch.no_grad()
-    def standardise(self, goal: Tensor) -> None:
-        """Choose `mean` and `scale` so that the codes of these (N, 88) goals have variance 1."""
+    def standardize(self, goal: Tensor) -> None:
+        """Set `mean` and `scale` so that the codes of goals (N, 88) have mean 0 and variance 1."""
         self.mean.zero_()
         self.scale.fill_(1.0)
         scale, mean = torch.std_mean(self(goal), dim=0, correction=0)
         self.mean.copy_(mean)
-        # A number that is always the same stays so.
+        # A number that never varies stays as it is.
         self.scale.copy_(torch.where(scale > 1e-6, scale, 1.0))
 
 
 class PositionalEncoding(nn.Module):
-    """Points, and sines and cosines of them, each twice as quick as the one before.
+    """Positions, and sines and cosines of them at doubling frequencies.
+
+    As in Mildenhall et al., "NeRF: representing scenes as neural radiance fields", 2020.
 
     Args:
-        octaves: how many frequencies; the slowest has its half period in the box of queries.
+        octaves: number of frequencies; the box of queries is half a period of the lowest.
     """
 
     low: Tensor
@@ -79,7 +81,7 @@ class PositionalEncoding(nn.Module):
     def __init__(self, octaves: int) -> None:
         super().__init__()
         self.size = 3 + 6 * octaves
-        # Constants: they are no part of what is saved.
+        # Constants, which are not saved.
         for name, value in (
             ("low", torch.tensor(QUERY_LOW, dtype=torch.float32)),
             ("high", torch.tensor(QUERY_HIGH, dtype=torch.float32)),
@@ -88,7 +90,7 @@ class PositionalEncoding(nn.Module):
             self.register_buffer(name, value, persistent=False)
 
     def forward(self, query: Tensor) -> Tensor:
-        """(..., size) of (..., 3) [m] world positions."""
+        """(..., size) of positions (..., 3) in the world frame [m]."""
         # -1 to 1 in the box.
         place = 2.0 * (query - self.low) / (self.high - self.low) - 1.0
         angle = (place[..., None] * self.frequencies).flatten(-2)
@@ -96,10 +98,10 @@ class PositionalEncoding(nn.Module):
 
 
 class GoalDecoder(nn.Module):
-    """From a code and a point to the distance of the point to the goal.
+    """From a code and a position to the distance of the position to the goal.
 
     Args:
-        octaves: of the positional encoding.
+        octaves: frequencies of the positional encoding.
     """
 
     def __init__(self, octaves: int) -> None:
@@ -114,21 +116,21 @@ class GoalDecoder(nn.Module):
         )
 
     def forward(self, plain: Tensor, query: Tensor) -> Tensor:
-        """(...) distances in keyboards of (..., 3) [m] points to goals.
+        """(...) distances of positions to goals, in lengths of the keyboard.
 
         Args:
-            plain: (..., 16) what the encoder's last layer gave: codes that are not standardised.
-            query: (..., 3) [m] world position.
+            plain: (..., 16) output of the encoder's last layer: codes that are not standardized.
+            query: (..., 3) positions in the world frame [m].
         """
         distances = self.layers(torch.cat((plain, self.encoding(query)), dim=-1))
         return cast(Tensor, distances[..., 0])
 
 
 class GoalAutoencoder(nn.Module):
-    """An encoder and the decoder with which it was trained.
+    """An encoder and the decoder with which it is trained.
 
     Args:
-        octaves: of the positional encoding.
+        octaves: frequencies of the positional encoding.
     """
 
     def __init__(self, octaves: int) -> None:
@@ -137,11 +139,11 @@ class GoalAutoencoder(nn.Module):
         self.decoder = GoalDecoder(octaves)
 
     def decode(self, code: Tensor, query: Tensor) -> Tensor:
-        """(...) distances in keyboards of (..., 3) [m] points to goals of (..., 16) codes."""
+        """(...) distances, in keyboard lengths, of (..., 3) [m] to goals with codes (..., 16)."""
         plain = code * self.encoder.scale + self.encoder.mean
         return cast(Tensor, self.decoder(plain, query))
 
     def forward(self, goal: Tensor, query: Tensor) -> Tensor:
-        """(N, Q) distances in keyboards of (N, Q, 3) [m] points to (N, 88) goals."""
+        """(N, Q) distances, in keyboard lengths, of (N, Q, 3) [m] to goals (N, 88)."""
         code = self.encoder(goal)[:, None].expand(-1, query.shape[1], -1)
         return self.decode(code, query)

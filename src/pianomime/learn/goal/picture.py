@@ -1,4 +1,4 @@
-"""A picture of the space of codes: whether goals that are near each other have codes that are."""
+"""A picture of the goal codes: whether similar goals have similar codes."""
 
 from __future__ import annotations
 
@@ -14,20 +14,22 @@ from pianomime.learn.goal.autoencoder import GoalEncoder
 from pianomime.learn.goal.sdf import chamfer
 
 _SHOWN = 3000
+"""Goals in the scatter plot."""
 _COMPARED = 600
+"""Goals that are compared in pairs."""
 
 
 @torch.no_grad()
 def draw_codes(encoder: GoalEncoder, goal: torch.Tensor, path: Path) -> None:
     """Write the picture.
 
-    Left, codes along their two principal axes, coloured by where on the keyboard their keys are;
-    right, how far apart codes are over how far apart their goals are.
+    Left: the codes along their two principal axes, coloured by the mean key of their goals. Right:
+    the distance of codes over the Chamfer distance of their goals, in pairs.
 
     Args:
-        encoder: of goals.
-        goal: (N, 88) goals that it has not learned from; silence is left out.
-        path: of a .png file.
+        encoder: trained.
+        goal: (N, 88) goals that it was not trained on; silence is left out.
+        path: of the .png file.
 
     Raises:
         OSError: it cannot be written.
@@ -45,9 +47,9 @@ def draw_codes(encoder: GoalEncoder, goal: torch.Tensor, path: Path) -> None:
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
     dots = left.scatter(*place.T, c=middle, s=4, cmap="viridis")
-    figure.colorbar(dots, ax=left, label="key in the middle of the goal")
-    left.set(title="codes of unseen goals", xlabel="first axis", ylabel="second axis")
+    figure.colorbar(dots, ax=left, label="mean key of the goal")
+    left.set(title="codes of validation goals", xlabel="first axis", ylabel="second axis")
     right.hexbin(apart.numpy() * 100, codes.numpy(), gridsize=50, bins="log")
-    right.set(title="pairs of goals", xlabel="goals apart [cm]", ylabel="codes apart")
+    right.set(title="pairs of goals", xlabel="distance of goals [cm]", ylabel="distance of codes")
     with atomic(path) as temporary:
         figure.savefig(temporary, dpi=120)

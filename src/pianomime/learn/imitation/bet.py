@@ -1,4 +1,7 @@
-"""A behaviour transformer: the nearest of some typical actions, and how far off it is (table 8)."""
+"""Behaviour transformer: which of some typical actions, and a correction to it (paper, table 8).
+
+After Shafiullah et al., "Behavior transformers: cloning k modes with one stone", 2022.
+"""
 
 from __future__ import annotations
 
@@ -6,54 +9,59 @@ import torch
 from torch import Tensor, nn
 
 from pianomime.learn.imitation.config import BetConfig
-from pianomime.learn.imitation.shapes import Sizes
+from pianomime.learn.imitation.shapes import NetworkShape
 
 
 class BetNet(nn.Module):
-    """Attention over the frames ahead, what is seen besides, and one question a frame to be said.
+    """A transformer encoder over the frames ahead, the vector, and one query for each action frame.
 
     Attributes:
-        centres: (bins, D) typical actions, a part of the weights.
+        centres: (bins, D) typical actions, normalized: the centres of k-means; part of the weights.
 
     Args:
-        sizes: of what is given and said.
-        config: its own.
+        shape: of inputs and output.
+        config: sizes of the layers.
     """
 
     centres: Tensor
 
-    def __init__(self, sizes: Sizes, config: BetConfig) -> None:
+    def __init__(self, shape: NetworkShape, config: BetConfig) -> None:
         super().__init__()
-        wide = config.width
-        self.config, self.chunk = config, sizes.chunk
-        self.ahead, self.vector = nn.Linear(sizes.channels, wide), nn.Linear(sizes.vector, wide)
-        asked = sizes.frames + 1 + sizes.chunk
-        self.place = nn.Parameter(0.02 * torch.randn(asked, wide))
+        width = config.width
+        self.config, self.chunk = config, shape.chunk
+        self.ahead, self.vector = nn.Linear(shape.channels, width), nn.Linear(shape.vector, width)
+        tokens = shape.frames + 1 + shape.chunk
+        self.position = nn.Parameter(0.02 * torch.randn(tokens, width))
         layer = nn.TransformerEncoderLayer(
-            wide, config.heads, 4 * wide, 0.1, "gelu", batch_first=True, norm_first=True
+            width, config.heads, 4 * width, 0.1, "gelu", batch_first=True, norm_first=True
         )
         self.layers = nn.TransformerEncoder(layer, config.layers, enable_nested_tensor=False)
-        self.normal = nn.LayerNorm(wide)
-        self.choice = nn.Linear(wide, config.bins)
-        self.offset = nn.Linear(wide, config.bins * sizes.width)
-        self.register_buffer("centres", torch.zeros(config.bins, sizes.width))
+        self.norm = nn.LayerNorm(width)
+        self.choice = nn.Linear(width, config.bins)
+        self.offset = nn.Linear(width, config.bins * shape.action)
+        self.register_buffer("centres", torch.zeros(config.bins, shape.action))
 
     def forward(self, ahead: Tensor, vector: Tensor) -> tuple[Tensor, Tensor]:
-        """(B, T, bins) how likely each typical action is, and (B, T, bins, D) each made exact."""
+        """Probability of each bin (B, T, bins), and its corrected action (B, T, bins, D).
+
+        Args:
+            ahead: (B, G, C) frames ahead.
+            vector: (B, V).
+        """
         # Not len(): ONNX export would take the batch of its example for that of all.
-        asked = ahead.new_zeros(ahead.shape[0], self.chunk, self.place.shape[1])
-        tokens = torch.cat([self.ahead(ahead), self.vector(vector)[:, None], asked], dim=1)
-        out = self.normal(self.layers(tokens + self.place))[:, -self.chunk :]
+        queries = ahead.new_zeros(ahead.shape[0], self.chunk, self.position.shape[1])
+        tokens = torch.cat([self.ahead(ahead), self.vector(vector)[:, None], queries], dim=1)
+        out = self.norm(self.layers(tokens + self.position))[:, -self.chunk :]
         offset = self.offset(out).reshape(*out.shape[:2], *self.centres.shape)
         return self.choice(out).softmax(-1), self.centres + offset
 
     def loss(self, ahead: Tensor, vector: Tensor, target: Tensor) -> Tensor:
-        """Of the choice, and of the offset from the typical action that is nearest."""
-        chance, exact = self(ahead, vector)
+        """Cross-entropy of the nearest bin, and the weighted squared error of its correction."""
+        probability, actions = self(ahead, vector)
         nearest = torch.cdist(target, self.centres.expand(len(target), -1, -1)).argmin(-1)
-        chosen = nn.functional.nll_loss(
-            chance.float().clamp_min(1e-8).log().flatten(0, 1), nearest.flatten()
+        choice_loss = nn.functional.nll_loss(
+            probability.float().clamp_min(1e-8).log().flatten(0, 1), nearest.flatten()
         )
         index = nearest[..., None, None].expand(-1, -1, 1, target.shape[-1])
-        off = nn.functional.mse_loss(exact.float().gather(2, index)[:, :, 0], target)
-        return chosen + self.config.offset_weight * off
+        offset_loss = nn.functional.mse_loss(actions.float().gather(2, index)[:, :, 0], target)
+        return choice_loss + self.config.offset_weight * offset_loss

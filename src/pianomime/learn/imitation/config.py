@@ -1,4 +1,8 @@
-"""Every choice in learning a generalist: typed, saved with it, and the command line."""
+"""Settings of a policy that learns by imitation: typed, saved with it, and the command line.
+
+Every config checks itself when it is made and raises an `InputError` that names the setting as the
+command line does, such as `diffusion.channels`. Cheap to import: no numpy, no torch.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,9 @@ from typing import Annotated, Literal, get_args
 import tyro
 
 from pianomime.errors import InputError
-from pianomime.learn.imitation.trainer_config import TrainerConfig, check_fit
-from pianomime.learn.runs.validation import above_zero, within
+from pianomime.learn.imitation.trainer_config import TrainerConfig
 from pianomime.policies.horizon import CHUNK
+from pianomime.validation import above_zero, one_of, within
 
 Size = Literal["small", "paper"]
 PolicyName = Literal[
@@ -26,206 +30,210 @@ PolicyName = Literal[
     "bc-mse",
 ]
 POLICIES: tuple[PolicyName, ...] = get_args(PolicyName)
-
+LEVELS = ("high", "low", "end-to-end")
+NETWORKS = ("diffusion", "bet", "mlp")
 
 GROUPS = 8
-"""Of the channels of a convolution, each normalised by itself."""
+"""Channels are normalized in this many groups (Wu and He, "Group normalization", 2018)."""
 
 
 @dataclass(frozen=True)
 class DiffusionConfig:
-    """A U-Net that takes noise off chunks (paper, table 7)."""
+    """A U-Net that takes the noise off action chunks (paper, table 7)."""
 
     channels: tuple[int, ...] = (32, 64, 128)
     """Filters of each level of the U-Net."""
-    kernel: int = 5
-    """Of its convolutions."""
-    encoder: tuple[int, ...] = (32, 64)
-    """Filters of the temporal convolutions over what is seen of the frames ahead."""
-    encoder_kernel: int = 3
-    """Of those."""
-    condition: tuple[int, ...] = (768, 768)
-    """Width of the layers that bring together all that is seen; none to leave it as it is."""
-    guess: bool = True
-    """Whether what is seen also says a chunk straight away, to which the U-Net adds."""
-    step_width: int = 64
-    """Numbers that tell the step of the diffusion."""
+    kernel_size: int = 5
+    """Frames in a kernel of the U-Net's convolutions."""
+    encoder_channels: tuple[int, ...] = (32, 64)
+    """Filters of the temporal convolutions that encode the frames ahead."""
+    encoder_kernel_size: int = 3
+    """Frames in a kernel of those."""
+    condition_layers: tuple[int, ...] = (768, 768)
+    """Widths of the layers between the encoded observation and FiLM; none to use it directly."""
+    skip: bool = True
+    """Add a linear prediction from the condition to the output of the U-Net."""
+    step_embedding: int = 64
+    """Size of the sinusoidal embedding of the diffusion step."""
     steps: int = 100
-    """Steps of the diffusion."""
+    """Diffusion steps in training."""
     prediction: Literal["epsilon", "sample"] = "sample"
-    """What the network says: the noise, or what is without it."""
+    """What the network predicts: the noise, or the chunk without it."""
+
+    def __post_init__(self) -> None:
+        levels = len(self.channels)
+        if not levels or CHUNK % 2 ** (levels - 1):
+            raise InputError(
+                f"diffusion.channels: a U-Net over {CHUNK} frames has 1 to 3 levels, not {levels}"
+            )
+        for name in ("channels", "encoder_channels"):
+            widths = getattr(self, name)
+            if not widths or any(width < 1 or width % GROUPS for width in widths):
+                option = name.replace("_", "-")
+                raise InputError(f"diffusion.{option} must be multiples of {GROUPS}, not {widths}")
+        for name in ("kernel_size", "encoder_kernel_size"):
+            size = getattr(self, name)
+            if size < 1 or not size % 2:
+                raise InputError(f"diffusion.{name.replace('_', '-')} must be odd, not {size}")
+        for width in self.condition_layers:
+            within("diffusion.condition_layers", width, 1)
+        if self.step_embedding < 4 or self.step_embedding % 2:
+            raise InputError(
+                f"diffusion.step-embedding must be even, from 4 on, not {self.step_embedding}"
+            )
+        within("diffusion.steps", self.steps, 2)
+        one_of("diffusion.prediction", self.prediction, ("epsilon", "sample"))
 
 
 @dataclass(frozen=True)
 class BetConfig:
-    """A behaviour transformer: which of some typical actions, and how far off (paper, table 8)."""
+    """A behaviour transformer: one of some typical actions, and its correction (paper, table 8)."""
 
     layers: int = 4
+    """Transformer layers."""
     heads: int = 4
+    """Attention heads of each layer."""
     width: int = 64
+    """Size of the tokens."""
     bins: int = 64
-    """Typical actions: what is said of one frame."""
+    """Number of typical actions, the centres of k-means."""
     offset_weight: float = 10.0
-    """Of the loss of the offset, beside that of the choice."""
+    """Weight of the loss of the correction, beside that of the choice of a bin."""
+
+    def __post_init__(self) -> None:
+        for name, least in (("layers", 1), ("heads", 1), ("width", 1), ("bins", 2)):
+            within(f"bet.{name}", getattr(self, name), least)
+        if self.width % self.heads:
+            raise InputError(
+                f"bet.width ({self.width}) must be a multiple of bet.heads ({self.heads})"
+            )
+        above_zero("bet.offset_weight", self.offset_weight)
 
 
 @dataclass(frozen=True)
 class MlpConfig:
-    """A network without structure (paper, appendix G, BC-MSE)."""
+    """A plain feedforward network (paper, appendix G, BC-MSE)."""
 
     hidden: tuple[int, ...] = (512, 512, 512)
-    """Width of each hidden layer."""
+    """Widths of the hidden layers."""
+
+    def __post_init__(self) -> None:
+        for width in self.hidden:
+            within("mlp.hidden", width, 1)
+
+
+_DEFAULTS = {"diffusion": DiffusionConfig(), "bet": BetConfig(), "mlp": MlpConfig()}
 
 
 @dataclass(frozen=True)
 class PolicyConfig:
-    """One network of a generalist. The first four are what its name stands for."""
+    """One policy of a generalist. The first four settings are what its name stands for."""
 
-    level: Annotated[Literal["high", "low", "whole"], tyro.conf.Suppress]
-    """From goals to fingertips, from fingertips to controls, or from goals to controls at once."""
+    level: Annotated[Literal["high", "low", "end-to-end"], tyro.conf.Suppress]
+    """From goals to fingertips, from fingertips to controls, or from goals straight to controls."""
     network: Annotated[Literal["diffusion", "bet", "mlp"], tyro.conf.Suppress]
-    """Its kind."""
-    code: Annotated[Literal["sdf", "binary"], tyro.conf.Suppress] = "sdf"
-    """How goals are told: by the goal encoder, or as they are."""
-    prior: Annotated[bool, tyro.conf.Suppress] = False
-    """Whether controls are told as what to add to those of inverse kinematics."""
+    """Kind of network."""
+    goal_encoding: Annotated[Literal["sdf", "binary"], tyro.conf.Suppress] = "sdf"
+    """Goals as codes of the goal encoder, or as 88 zeros and ones."""
+    residual: Annotated[bool, tyro.conf.Suppress] = False
+    """Predict what to add to the controls of inverse kinematics."""
     transpose: bool = True
-    """Whether samples are moved by octaves by chance."""
+    """Augment the data: move samples by an octave up or down at random."""
     tip_noise: float = 0.0
-    """[m] Noise that is added to each present fingertip in training."""
+    """Standard deviation [m] of the noise on each present fingertip in training, high levels."""
     hand_noise: float = 0.0
-    """[m] Noise along the keyboard that is added to whole hands in training: from where they have
-    strayed to they learn to come back."""
+    """Standard deviation [m] of the noise on whole hands along the keyboard in training, high
+    levels: they learn to recover from their own drift."""
     target_noise: float = 0.0
-    """[m] Noise that is added in training to the targets of hands and of idle fingertips: a high
-    level is only about right."""
+    """Standard deviation [m] of the noise on the targets of wrists and idle fingertips in training,
+    low levels: a high level is only roughly right."""
     diffusion: DiffusionConfig = field(default_factory=DiffusionConfig)
     bet: BetConfig = field(default_factory=BetConfig)
     mlp: MlpConfig = field(default_factory=MlpConfig)
-    fit: TrainerConfig = field(
+    trainer: TrainerConfig = field(
         default_factory=lambda: TrainerConfig(steps=5_000, learning_rate=1e-3)
     )
 
+    def __post_init__(self) -> None:
+        one_of("level", self.level, LEVELS)
+        one_of("network", self.network, NETWORKS)
+        one_of("goal_encoding", self.goal_encoding, ("sdf", "binary"))
+        for name, level in (("tip_noise", "high"), ("hand_noise", "high"), ("target_noise", "low")):
+            within(name, getattr(self, name), 0, 1)
+            if getattr(self, name) and self.level != level:
+                option = name.replace("_", "-")
+                raise InputError(f"{option} does nothing here: it is for {level} levels")
+        for name, default in _DEFAULTS.items():
+            if name != self.network and getattr(self, name) != default:
+                raise InputError(f"{name}.* does nothing here: this policy is {self.network}")
+
     @property
     def chunk(self) -> int:
-        """Frames that are said at once; a feedforward network says the next one."""
+        """Frames of actions that are predicted at once; a feedforward network predicts one."""
         return 1 if self.network == "mlp" else CHUNK
 
 
-def check_stage(config: PolicyConfig) -> None:
-    """Refuse settings out of range, or that do not fit together.
-
-    Raises:
-        InputError: the first of them, as it is called on the command line.
-    """
-    for name, level in (("tip_noise", "high"), ("hand_noise", "high"), ("target_noise", "low")):
-        within(name, getattr(config, name), 0, 1)
-        if getattr(config, name) and config.level != level:
-            option = name.replace("_", "-")
-            raise InputError(f"{option} does nothing here: it is for {level} levels")
-    networks = {"diffusion": _check_diffusion, "bet": _check_bet, "mlp": _check_mlp}
-    networks.pop(config.network)(config)
-    for name in networks:
-        if getattr(config, name) != _UNUSED[name]:
-            raise InputError(f"{name}.* does nothing here: this stage is {config.network}")
-    check_fit(config.fit)
-
-
-_UNUSED = {"diffusion": DiffusionConfig(), "bet": BetConfig(), "mlp": MlpConfig()}
-
-
-def _check_diffusion(stage: PolicyConfig) -> None:
-    config = stage.diffusion
-    levels = len(config.channels)
-    if not levels or CHUNK % 2 ** (levels - 1):
-        raise InputError(
-            f"diffusion.channels: a U-Net over {CHUNK} frames has 1 to 3 levels, not {levels}"
-        )
-    for name in ("channels", "encoder"):
-        widths = getattr(config, name)
-        if not widths or any(width < 1 or width % GROUPS for width in widths):
-            raise InputError(f"diffusion.{name} must be multiples of {GROUPS}, not {widths}")
-    for name in ("kernel", "encoder_kernel"):
-        size = getattr(config, name)
-        if size < 1 or not size % 2:
-            raise InputError(f"diffusion.{name.replace('_', '-')} must be odd, not {size}")
-    for width in config.condition:
-        within("diffusion.condition", width, 1)
-    if config.step_width < 4 or config.step_width % 2:
-        raise InputError(f"diffusion.step-width must be even, from 4 on, not {config.step_width}")
-    within("diffusion.steps", config.steps, 2)
-
-
-def _check_bet(stage: PolicyConfig) -> None:
-    config = stage.bet
-    for name, least in (("layers", 1), ("heads", 1), ("width", 1), ("bins", 2)):
-        within(f"bet.{name}", getattr(config, name), least)
-    if config.width % config.heads:
-        raise InputError(
-            f"bet.width ({config.width}) must be a multiple of bet.heads ({config.heads})"
-        )
-    above_zero("bet.offset_weight", config.offset_weight)
-
-
-def _check_mlp(stage: PolicyConfig) -> None:
-    for width in stage.mlp.hidden:
-        within("mlp.hidden", width, 1)
-
-
-_TIPS, _HANDS = 0.01, 0.06
-_TARGETS = 0.008
+_TIP_NOISE, _HAND_NOISE = 0.01, 0.06
+_TARGET_NOISE = 0.008
 # Controls take longer to learn than fingertips, and plain networks are quick.
 _LONG, _PLAIN = (TrainerConfig(steps=steps, learning_rate=1e-3) for steps in (10_000, 15_000))
 
-_STAGES: dict[PolicyName, PolicyConfig] = {
-    "high-diff": PolicyConfig("high", "diffusion", tip_noise=_TIPS, hand_noise=_HANDS),
+_CONFIGS: dict[PolicyName, PolicyConfig] = {
+    "high-diff": PolicyConfig("high", "diffusion", tip_noise=_TIP_NOISE, hand_noise=_HAND_NOISE),
     "high-diff-no-sdf": PolicyConfig(
-        "high", "diffusion", "binary", tip_noise=_TIPS, hand_noise=_HANDS
+        "high", "diffusion", "binary", tip_noise=_TIP_NOISE, hand_noise=_HAND_NOISE
     ),
-    "high-bet": PolicyConfig("high", "bet", tip_noise=_TIPS, hand_noise=_HANDS),
-    "low-diff": PolicyConfig("low", "diffusion", target_noise=_TARGETS, fit=_LONG),
-    "low-diff-no-sdf": PolicyConfig("low", "diffusion", "binary", target_noise=_TARGETS, fit=_LONG),
-    "low-diff-res": PolicyConfig("low", "diffusion", prior=True, target_noise=_TARGETS, fit=_LONG),
-    "low-bet": PolicyConfig("low", "bet", target_noise=_TARGETS, fit=_LONG),
+    "high-bet": PolicyConfig("high", "bet", tip_noise=_TIP_NOISE, hand_noise=_HAND_NOISE),
+    "low-diff": PolicyConfig("low", "diffusion", target_noise=_TARGET_NOISE, trainer=_LONG),
+    "low-diff-no-sdf": PolicyConfig(
+        "low", "diffusion", "binary", target_noise=_TARGET_NOISE, trainer=_LONG
+    ),
+    "low-diff-res": PolicyConfig(
+        "low", "diffusion", residual=True, target_noise=_TARGET_NOISE, trainer=_LONG
+    ),
+    "low-bet": PolicyConfig("low", "bet", target_noise=_TARGET_NOISE, trainer=_LONG),
     "low-mse": PolicyConfig(
         "low",
         "mlp",
         "binary",
-        target_noise=_TARGETS,
+        target_noise=_TARGET_NOISE,
         mlp=MlpConfig((768, 768, 768)),
-        fit=_PLAIN,
+        trainer=_PLAIN,
     ),
-    "one-stage-diff": PolicyConfig("whole", "diffusion", fit=_LONG),
-    "bc-mse": PolicyConfig("whole", "mlp", "binary", fit=_PLAIN),
+    "one-stage-diff": PolicyConfig("end-to-end", "diffusion", trainer=_LONG),
+    "bc-mse": PolicyConfig("end-to-end", "mlp", "binary", trainer=_PLAIN),
 }
 
 _PAPER = {
     "diffusion": DiffusionConfig(
-        channels=(256, 512, 1024), condition=(), guess=False, step_width=256, prediction="epsilon"
+        channels=(256, 512, 1024),
+        condition_layers=(),
+        skip=False,
+        step_embedding=256,
+        prediction="epsilon",
     ),
     "bet": BetConfig(layers=8, heads=8, width=120),
     "mlp": MlpConfig(hidden=(1024, 1024, 1024)),
 }
-"""Tables 7 and 8, and appendix G."""
+"""Networks of tables 7 and 8, and of appendix G."""
+
+_PAPER_SAMPLES = 110_000
+"""Pairs of state and action in the paper's data."""
 
 
-def policy_config(stage: PolicyName, size: Size = "small") -> PolicyConfig:
-    """The config of a stage by its name.
+def policy_config(name: PolicyName, size: Size = "small") -> PolicyConfig:
+    """The default config of a policy by its name.
 
-    The paper's size is trained as in its tables: as many passes over the data, at its rates.
+    The paper's size is trained as in its tables 7 and 8: as many epochs, at its learning rates.
     """
-    config = _STAGES[stage]
+    config = _CONFIGS[name]
     if size == "small":
         return config
-    rate = 3e-4 if config.network == "bet" else 1e-4
+    learning_rate = 3e-4 if config.network == "bet" else 1e-4
     epochs = 1200 if config.network == "bet" else 800
-    steps = epochs * _FRAMES // config.fit.batch
+    steps = epochs * _PAPER_SAMPLES // config.trainer.batch
     return replace(
         config,
-        fit=replace(config.fit, steps=steps, learning_rate=rate),
+        trainer=replace(config.trainer, steps=steps, learning_rate=learning_rate),
         **{config.network: _PAPER[config.network]},  # type: ignore[arg-type]
     )
-
-
-_FRAMES = 110_000
-"""Pairs of state and action in the paper's data."""

@@ -1,11 +1,11 @@
-"""From a trained stage to the ONNX file that is played."""
+"""From a trained policy to the ONNX file that is played."""
 
 from __future__ import annotations
 
-import json
 import logging
 import tempfile
 import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,125 +16,141 @@ from torch import Tensor, nn
 
 from pianomime.files import atomic
 from pianomime.keyboard import KEYS
-from pianomime.learn.imitation.bet import BetNet
-from pianomime.learn.imitation.diffusion import DiffusionNet
-from pianomime.learn.imitation.network import Stage
-from pianomime.policies.horizon import CHUNK, HIGH_GOALS
-from pianomime.policies.policy import FORMAT, VERSION, OnnxPolicy
+from pianomime.learn.imitation.network import PolicyNetwork
+from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
+from pianomime.policies.policy import (
+    METADATA,
+    AsinhNormalizer,
+    DiffusionInfo,
+    NetworkPolicy,
+    PolicyInfo,
+)
 from pianomime.policies.sampler import Sampler
 
-_SMALL = 1024
-"""Numbers in a weight that is kept as it is."""
+_MIN_HALVED = 1024
+"""Weights with fewer numbers than this are kept in 32 bits."""
 
 
-def export_stage(stage: Stage, name: str, path: Path) -> None:
-    """Write a stage as ONNX, whole or not at all.
+def export_policy(network: PolicyNetwork, info: PolicyInfo, path: Path) -> None:
+    """Write a policy as ONNX, whole or not at all.
 
     Args:
-        stage: trained.
-        name: of it.
-        path: where to.
+        network: trained.
+        info: its metadata.
+        path: of the file.
 
     Raises:
         OSError: it cannot be written.
     """
-    given, names = _example(stage)
-    outputs = ["chance", "exact"] if stage.config.network == "bet" else ["said"]
-    export_network(_Asked(stage).eval(), given, names, outputs, about_stage(stage, name), path)
+    outputs = ["probability", "actions"] if info.network == "bet" else ["action"]
+    export_network(_Predict(network), _example(network), outputs, info, path)
 
 
 def export_network(
     network: nn.Module,
-    given: tuple[Tensor, ...],
-    names: list[str],
-    outputs: list[str],
-    about: dict[str, Any],
+    example: Mapping[str, Tensor],
+    outputs: Sequence[str],
+    info: PolicyInfo,
     path: Path,
 ) -> None:
     """Write a network as ONNX, whole or not at all.
 
     Args:
-        network: in eval mode.
-        given: examples of what it is given, in batches.
-        names: of these.
-        outputs: names of what it says.
-        about: what the file tells of it.
-        path: where to.
+        network: called with the inputs by name.
+        example: a batch of inputs by name.
+        outputs: names of the outputs.
+        info: metadata of the policy.
+        path: of the file.
 
     Raises:
         OSError: it cannot be written.
     """
     import onnx
 
+    names = list(example)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-        raw = Path(folder, "stage.onnx")
+        raw = Path(folder, "policy.onnx")
         torch.onnx.export(
-            network,
-            given,
+            _ByPosition(network, names).eval(),
+            tuple(example.values()),
             str(raw),
             input_names=names,
-            output_names=outputs,
-            dynamic_axes={one: {0: "batch"} for one in (*names, *outputs)},
+            output_names=list(outputs),
+            dynamic_axes={name: {0: "batch"} for name in (*names, *outputs)},
             dynamo=False,
         )
         model = onnx.load(str(raw))
     _halve(model)
-    onnx.helper.set_model_props(
-        model, {"about": json.dumps({"format": FORMAT, "version": VERSION, **about})}
-    )
+    onnx.helper.set_model_props(model, {METADATA: info.to_metadata()})
     with atomic(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
 
 
-def torch_policy(stage: Stage, name: str = "", sampler: Sampler | None = None) -> OnnxPolicy:
-    """A stage that is run by torch, to be looked at while it learns."""
-    asked = _Asked(stage)
+def torch_policy(
+    network: PolicyNetwork, name: str = "", sampler: Sampler | None = None
+) -> NetworkPolicy:
+    """A policy that is run by torch, to be evaluated in training.
 
-    def run(given: dict[str, NDArray[Any]]) -> list[NDArray[np.float32]]:
-        device = stage.target.middle.device
-        training = stage.training
+    Args:
+        network: in training or trained; it stays in the mode it is in.
+        name: of the policy.
+        sampler: how a diffusion is sampled.
+    """
+
+    def run(inputs: dict[str, NDArray[Any]]) -> list[NDArray[np.float32]]:
+        device = network.action_normalizer.median.device
+        training = network.training
         with torch.inference_mode():
-            out = asked.eval()(*(torch.from_numpy(value).to(device) for value in given.values()))
-        stage.train(training)
-        return [one.cpu().numpy() for one in (out if isinstance(out, tuple) else (out,))]
+            tensors = {name: torch.from_numpy(value).to(device) for name, value in inputs.items()}
+            outputs = network.eval().predict(**tensors)
+        network.train(training)
+        return [output.cpu().numpy() for output in outputs]
 
-    return OnnxPolicy(run, about_stage(stage, name), sampler or Sampler())
+    return NetworkPolicy(run, policy_info(network, name), sampler or Sampler())
 
 
-def about_stage(stage: Stage, name: str) -> dict[str, Any]:
-    """What a file of a stage tells of itself."""
-    config = stage.config
-    about: dict[str, Any] = {
-        "stage": name,
-        "level": config.level,
-        "prior": config.prior,
-        "network": config.network,
-        "chunk": config.chunk,
-        "width": len(stage.target.middle),
-    }
+def policy_info(network: PolicyNetwork, name: str, data: str = "") -> PolicyInfo:
+    """The metadata of a policy.
+
+    Args:
+        network: the policy.
+        name: its name.
+        data: hash of its training data.
+    """
+    config, diffusion = network.config, None
     if config.network == "diffusion":
-        about |= {
-            "steps": config.diffusion.steps,
-            "prediction": config.diffusion.prediction,
-            "scale": {
-                "middle": stage.target.middle.tolist(),
-                "unit": stage.target.unit.tolist(),
-                "limit": stage.target.limit.tolist(),
-            },
-        }
-    return about
+        normalizer = network.action_normalizer
+        diffusion = DiffusionInfo(
+            config.diffusion.steps,
+            config.diffusion.prediction,
+            AsinhNormalizer(
+                tuple(normalizer.median.tolist()),
+                tuple(normalizer.unit.tolist()),
+                tuple(normalizer.limit.tolist()),
+            ),
+        )
+    return PolicyInfo(
+        name=name,
+        level=config.level,
+        network=config.network,
+        action_size=network.action_size,
+        chunk=config.chunk,
+        residual=config.residual,
+        diffusion=diffusion,
+        data=data,
+    )
 
 
 def _halve(model: Any) -> None:
-    """Keep weights in 16 bits, made 32 when the file is read: half the size, the same speed."""
+    """Store weights in 16 bits and cast them to 32 when the file is loaded: half the size."""
     import onnx
 
     casts = []
     for weight in model.graph.initializer:
         values = onnx.numpy_helper.to_array(weight)
-        if values.dtype != np.float32 or values.size < _SMALL:
+        if values.dtype != np.float32 or values.size < _MIN_HALVED:
             continue
         name = weight.name
         half = onnx.numpy_helper.from_array(values.astype(np.float16), f"{name}/half")
@@ -145,39 +161,37 @@ def _halve(model: Any) -> None:
     model.graph.node.extend(nodes)
 
 
-class _Asked(nn.Module):
-    """A stage as it is called when it plays; only what it sees is an argument."""
+class _Predict(nn.Module):
+    """`PolicyNetwork.predict` as a module of its own, for ONNX export calls modules."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, network: PolicyNetwork) -> None:
         super().__init__()
-        self.stage = stage
-        self.flat = not len(stage.frames.middle)
+        self.network = network
 
-    def forward(self, *given: Tensor) -> Tensor | tuple[Tensor, Tensor]:
-        rest = list(given)
-        goal = rest.pop(0)
-        frames = goal[..., :0] if self.flat else rest.pop(0)
-        ahead, vector = self.stage.seen(goal, frames, rest.pop(0))
-        net, target = self.stage.net, self.stage.target
-        if isinstance(net, DiffusionNet):
-            noisy, step = rest
-            out: Tensor = net(ahead, vector, noisy, step)
-            return out
-        if isinstance(net, BetNet):
-            chance, exact = net(ahead, vector)
-            return chance, target.undo(exact)
-        return target.undo(net(ahead, vector))
+    def forward(self, **inputs: Tensor) -> tuple[Tensor, ...]:
+        return self.network.predict(**inputs)
 
 
-def _example(stage: Stage) -> tuple[tuple[Tensor, ...], list[str]]:
-    """Arguments, and what they are called."""
-    width = len(stage.target.middle)
-    frames = HIGH_GOALS if stage.config.level == "high" else CHUNK
-    given = {"goal": torch.zeros(2, frames, KEYS)}
-    if len(stage.frames.middle):
-        given["frames"] = torch.zeros(2, frames, len(stage.frames.middle))
-    given["vector"] = torch.zeros(2, len(stage.vector.middle))
-    if isinstance(stage.net, DiffusionNet):
-        given["noisy"] = torch.zeros(2, stage.config.chunk, width)
-        given["step"] = torch.zeros(2, dtype=torch.int64)
-    return tuple(given.values()), list(given)
+class _ByPosition(nn.Module):
+    """Calls a network with named inputs where ONNX export passes them by position."""
+
+    def __init__(self, network: nn.Module, names: Sequence[str]) -> None:
+        super().__init__()
+        self.network, self.names = network, names
+
+    def forward(self, *inputs: Tensor) -> Any:
+        return self.network(**dict(zip(self.names, inputs, strict=True)))
+
+
+def _example(network: PolicyNetwork) -> dict[str, Tensor]:
+    """A batch of inputs by name; inputs of size 0 are left out."""
+    config = network.config
+    frames = GOAL_HORIZON if config.level == "high" else CHUNK
+    example = {"goal": torch.zeros(2, frames, KEYS)}
+    if network.frame_features:
+        example["frames"] = torch.zeros(2, frames, network.frame_features)
+    example["vector"] = torch.zeros(2, network.vector_features)
+    if config.network == "diffusion":
+        example["noisy"] = torch.zeros(2, config.chunk, network.action_size)
+        example["step"] = torch.zeros(2, dtype=torch.int64)
+    return example

@@ -1,4 +1,4 @@
-"""A feedforward network that says the mean of what humans do (paper, appendix G, BC-MSE)."""
+"""A feedforward network that regresses the mean action (paper, appendix G, BC-MSE)."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ import torch
 from torch import Tensor, nn
 
 from pianomime.learn.imitation.config import MlpConfig
-from pianomime.learn.imitation.shapes import Sizes
+from pianomime.learn.imitation.shapes import NetworkShape
 
 
 class MlpNet(nn.Module):
-    """From all that is seen to one chunk.
+    """From the whole observation, flattened, to one action chunk.
 
     Args:
-        sizes: of what is given and said.
-        config: its own.
+        shape: of inputs and output.
+        config: sizes of the layers.
     """
 
-    def __init__(self, sizes: Sizes, config: MlpConfig) -> None:
+    def __init__(self, shape: NetworkShape, config: MlpConfig) -> None:
         super().__init__()
-        widths = (sizes.frames * sizes.channels + sizes.vector, *config.hidden)
+        widths = (shape.frames * shape.channels + shape.vector, *config.hidden)
         self.layers = hidden_layers(widths)
-        self.last = nn.Linear(widths[-1], sizes.chunk * sizes.width)
-        self.shape = (sizes.chunk, sizes.width)
+        self.last = nn.Linear(widths[-1], shape.chunk * shape.action)
+        self.shape = (shape.chunk, shape.action)
 
     def forward(self, ahead: Tensor, vector: Tensor) -> Tensor:
-        """(B, T, D)."""
-        seen = torch.cat([ahead.flatten(1), vector], dim=1)
-        out: Tensor = self.last(self.layers(seen))
+        """(B, T, D) normalized actions of frames ahead (B, G, C) and vectors (B, V)."""
+        features = torch.cat([ahead.flatten(1), vector], dim=1)
+        out: Tensor = self.last(self.layers(features))
         return out.reshape(-1, *self.shape)
 
     def loss(self, ahead: Tensor, vector: Tensor, target: Tensor) -> Tensor:
-        """Mean squared error."""
-        said: Tensor = self(ahead, vector)
-        return nn.functional.mse_loss(said.float(), target)
+        """Mean squared error to normalized actions (B, T, D)."""
+        predicted: Tensor = self(ahead, vector)
+        return nn.functional.mse_loss(predicted.float(), target)
 
 
 def hidden_layers(widths: Sequence[int]) -> nn.Sequential:
-    """Layers from each width to the next."""
+    """Linear layers from each width to the next, each with layer normalization and GELU."""
     layers: list[nn.Module] = []
     for before, after in pairwise(widths):
         layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.GELU()]

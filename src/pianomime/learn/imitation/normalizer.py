@@ -1,4 +1,4 @@
-"""Bringing numbers to a common size: an explicit step, whose figures are saved with the weights."""
+"""Normalizers of observations and actions; their parameters are saved with the weights."""
 
 from __future__ import annotations
 
@@ -9,83 +9,92 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-_FLAT = 1e-4
-"""Numbers that vary less than this in the data are not scaled up."""
-_FAR = 8.0
-"""Deviations beyond which numbers that are seen are as if they were there. Some are nearly always
-alike: a key that is seldom down would be hundreds of deviations away when it is."""
+_MIN_SPREAD = 1e-4
+"""Features that vary less than this in the data are not scaled up."""
+_CLIP = 8.0
+"""Observations are clipped to this many standard deviations. Some features hardly ever change: a
+key that is seldom down would be hundreds of deviations away when it is."""
 _TAIL = 0.0005
-"""Share of the values of what is said, at either end, that its range leaves out."""
+"""Share of the actions, at either end, that are clipped."""
 
 
-class Scale(nn.Module):
-    """Mean 0 and deviation 1, within -8..8, for what is seen.
+class StandardNormalizer(nn.Module):
+    """Observations with mean 0 and standard deviation 1, clipped to 8 standard deviations.
 
     Attributes:
-        middle, spread: (D,) what becomes 0, and what lies 1 from it; a part of the weights.
+        mean, std: (D,) of the data; part of the weights.
+
+    Args:
+        size: D.
     """
 
-    middle: Tensor
-    spread: Tensor
+    mean: Tensor
+    std: Tensor
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, size: int) -> None:
         super().__init__()
-        self.register_buffer("middle", torch.zeros(width))
-        self.register_buffer("spread", torch.ones(width))
+        self.register_buffer("mean", torch.zeros(size))
+        self.register_buffer("std", torch.ones(size))
 
     def fit(self, values: NDArray[np.floating[Any]]) -> None:
-        """Take it from values (..., D)."""
+        """Set mean and standard deviation to those of values (..., D)."""
         if not values.shape[-1]:
             return
         flat = values.reshape(-1, values.shape[-1]).astype(np.float64)
-        spread = flat.std(axis=0)
-        self.middle.copy_(torch.from_numpy(flat.mean(axis=0)))
-        self.spread.copy_(torch.from_numpy(np.where(spread < _FLAT, 1.0, spread)))
+        std = flat.std(axis=0)
+        self.mean.copy_(torch.from_numpy(flat.mean(axis=0)))
+        self.std.copy_(torch.from_numpy(np.where(std < _MIN_SPREAD, 1.0, std)))
 
     def forward(self, values: Tensor) -> Tensor:
-        """Scaled."""
-        return ((values - self.middle) / self.spread).clamp(-_FAR, _FAR)
+        """Normalize values (..., D)."""
+        return ((values - self.mean) / self.std).clamp(-_CLIP, _CLIP)
 
 
-class SaidScale(nn.Module):
-    """Within -1..1, for what is said, and finest near what is usual.
+class AsinhNormalizer(nn.Module):
+    """Actions within -1..1 by asinh scaling: linear near the median, logarithmic in the tails.
 
-    Hands mostly move by millimetres, and now and then leap by a hand's width. Were the leaps to
-    set the scale, the millimetres would drown in the noise of a diffusion. So it is an area
-    hyperbolic sine: even near the middle, logarithmic far from it.
+    Hands mostly move by millimetres, and now and then leap by a hand's width. If the leaps set a
+    linear scale, the millimetres would be lost in the noise of a diffusion. The area hyperbolic
+    sine is the usual remedy for heavy tails of both signs (Burbidge, Magee and Robb, "Alternative
+    transformations to handle extreme values of the dependent variable", 1988).
 
     Attributes:
-        middle, unit, limit: (D,) what becomes 0; how far from it things cease to be even; what
-            becomes 1, in that scale. A part of the weights.
+        median: (D,) what becomes 0; part of the weights, as are the others.
+        unit: (D,) distance from the median up to which it is about linear: the upper quartile of
+            the distances in the data.
+        limit: (D,) asinh((action - median) / unit) that becomes 1.
+
+    Args:
+        size: D.
     """
 
-    middle: Tensor
+    median: Tensor
     unit: Tensor
     limit: Tensor
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, size: int) -> None:
         super().__init__()
-        for name in ("middle", "unit", "limit"):
-            self.register_buffer(name, torch.ones(width))
+        for name in ("median", "unit", "limit"):
+            self.register_buffer(name, torch.ones(size))
 
     def fit(self, values: NDArray[np.floating[Any]]) -> None:
-        """Take it from values (..., D)."""
+        """Set the parameters for values (..., D)."""
         flat = values.reshape(-1, values.shape[-1]).astype(np.float64)
-        middle = np.median(flat, axis=0)
-        off = np.abs(flat - middle)
-        unit = np.maximum(np.quantile(off, 0.75, axis=0), _FLAT)
-        most = np.quantile(off, 1.0 - _TAIL, axis=0)
-        self.middle.copy_(torch.from_numpy(middle))
+        median = np.median(flat, axis=0)
+        distance = np.abs(flat - median)
+        unit = np.maximum(np.quantile(distance, 0.75, axis=0), _MIN_SPREAD)
+        largest = np.quantile(distance, 1.0 - _TAIL, axis=0)
+        self.median.copy_(torch.from_numpy(median))
         self.unit.copy_(torch.from_numpy(unit))
-        self.limit.copy_(torch.from_numpy(np.arcsinh(np.maximum(most, unit) / unit)))
+        self.limit.copy_(torch.from_numpy(np.arcsinh(np.maximum(largest, unit) / unit)))
 
     def forward(self, values: Tensor) -> Tensor:
-        """Scaled; what is beyond the range lies at its end."""
-        scaled: Tensor = torch.asinh((values - self.middle) / self.unit) / self.limit
-        return scaled.clamp(-1.0, 1.0)
+        """Normalize values (..., D); those beyond the limit are clipped."""
+        normalized: Tensor = torch.asinh((values - self.median) / self.unit) / self.limit
+        return normalized.clamp(-1.0, 1.0)
 
-    def undo(self, scaled: Tensor) -> Tensor:
-        """What `forward` scaled."""
-        off = scaled * self.limit
+    def denormalize(self, normalized: Tensor) -> Tensor:
+        """Values (..., D) of normalized ones (..., D)."""
+        x = normalized * self.limit
         # The hyperbolic sine, in operations that ONNX export knows.
-        return (off.exp() - (-off).exp()) / 2 * self.unit + self.middle
+        return (x.exp() - (-x).exp()) / 2 * self.unit + self.median

@@ -1,23 +1,23 @@
-"""How much a network is given and says."""
+"""Sizes of a policy network's inputs and outputs."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 
-class Sizes(NamedTuple):
-    """Of a network's inputs and its output.
+class NetworkShape(NamedTuple):
+    """Sizes of a network's inputs and its output.
 
     Attributes:
-        frames: frames ahead that are seen.
-        channels: numbers seen of each.
-        vector: numbers seen besides.
-        chunk: frames that are said.
-        width: numbers said of each.
+        frames: G, frames ahead in the observation.
+        channels: C, features of each of them: goal code and further features.
+        vector: V, features of the present frame.
+        chunk: T, frames of actions.
+        action: D, numbers of the action for one frame.
     """
 
     frames: int
     channels: int
     vector: int
     chunk: int
-    width: int
+    action: int

@@ -1,7 +1,10 @@
 """A one-dimensional U-Net over the frames of a chunk, conditioned by FiLM (paper, appendix F).
 
-Chunks are so short that a convolution over their frames is done as one product of matrices, from
-all frames to all: the same numbers, and faster on a processor.
+The U-Net is that of Chi et al., "Diffusion policy", 2023; FiLM, feature-wise linear modulation, is
+by Perez et al., "FiLM: visual reasoning with a general conditioning layer", 2018.
+
+Chunks are so short that a convolution over their frames is computed as one matrix product, from all
+frames to all: the same result, and faster on a CPU.
 """
 
 from __future__ import annotations
@@ -16,43 +19,51 @@ from pianomime.learn.imitation.config import GROUPS, DiffusionConfig
 
 
 class TemporalEncoder(nn.Module):
-    """Convolutions over the frames ahead: (B, T, C) to one row (B, width).
+    """Convolutions over the frames ahead, flattened to one row of features.
 
     Attributes:
-        width: of the row.
+        size: numbers in the row.
+
+    Args:
+        frames: G, frames ahead.
+        channels: C, features of each.
+        config: filters and kernel.
     """
 
     def __init__(self, frames: int, channels: int, config: DiffusionConfig) -> None:
         super().__init__()
         layers: list[nn.Module] = []
-        for before, after in pairwise((channels, *config.encoder)):
-            layers.append(_convolution(before, after, config.encoder_kernel, frames))
+        for before, after in pairwise((channels, *config.encoder_channels)):
+            layers.append(_convolution(before, after, config.encoder_kernel_size, frames))
         self.layers = nn.Sequential(*layers)
-        self.width = frames * config.encoder[-1]
+        self.size = frames * config.encoder_channels[-1]
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Of each sample."""
+        """(B, size) of frames ahead (B, G, C)."""
         features: Tensor = self.layers(frames.transpose(1, 2))
         return features.flatten(1)
 
 
 class ConditionalUnet(nn.Module):
-    """Says what noise is in chunks (B, T, D), or what they are without it.
+    """Predicts the noise in chunks (B, T, D), or the chunks without it.
 
     Args:
         frames: T.
         width: D.
-        condition: numbers that tell what is seen.
-        config: sizes.
+        condition: size of the encoded observation.
+        config: sizes of the layers.
     """
 
     def __init__(self, frames: int, width: int, condition: int, config: DiffusionConfig) -> None:
         super().__init__()
-        told = config.step_width
+        embedding = config.step_embedding
         self.step = nn.Sequential(
-            _StepEncoding(told), nn.Linear(told, 4 * told), nn.Mish(), nn.Linear(4 * told, told)
+            _StepEncoding(embedding),
+            nn.Linear(embedding, 4 * embedding),
+            nn.Mish(),
+            nn.Linear(4 * embedding, embedding),
         )
-        film, kernel = condition + told, config.kernel
+        film, kernel = condition + embedding, config.kernel_size
         levels = [width, *config.channels]
         top = config.channels[-1]
         self.down = nn.ModuleList()
@@ -73,24 +84,24 @@ class ConditionalUnet(nn.Module):
         )
 
     def forward(self, noisy: Tensor, step: Tensor, condition: Tensor) -> Tensor:
-        """(B, T, D) of noisy chunks (B, T, D) at steps (B,), seeing (B, condition)."""
-        told = nn.functional.mish(torch.cat([condition, self.step(step)], dim=1))
+        """(B, T, D) of noisy chunks (B, T, D) at diffusion steps (B,), given (B, condition)."""
+        encoded = nn.functional.mish(torch.cat([condition, self.step(step)], dim=1))
         x = noisy.transpose(1, 2)
         kept = []
         for level in self.down:
-            x, resized = level(x, told)
+            x, resized = level(x, encoded)
             kept.append(x)
             x = resized
         for block in self.middle:
-            x = block(x, told)
+            x = block(x, encoded)
         for level in self.up:
-            _, x = level(torch.cat([x, kept.pop()], dim=1), told)
+            _, x = level(torch.cat([x, kept.pop()], dim=1), encoded)
         out: Tensor = self.last(x)
         return out.transpose(1, 2)
 
 
 class FrameConvolution(nn.Module):
-    """A convolution over few frames, (B, C, T) to (B, D, S), as one product of matrices.
+    """A convolution over few frames, (B, C, T) to (B, D, S), computed as one matrix product.
 
     Its weights are those of `nn.Conv1d` with half a kernel of padding; transposed, those of
     `nn.ConvTranspose1d` that doubles the number of frames.
@@ -99,8 +110,8 @@ class FrameConvolution(nn.Module):
         before, after: C and D.
         kernel: frames of the kernel.
         frames: T.
-        stride: frames from one place of the kernel to the next.
-        transposed: whether it is the transpose of a convolution.
+        stride: of the convolution.
+        transposed: whether it is a transposed convolution.
     """
 
     places: Tensor
@@ -130,7 +141,7 @@ class FrameConvolution(nn.Module):
         assert convolution.bias is not None
         self.weight, self.bias = convolution.weight, convolution.bias
         self.sum = "iok,kts->itos" if transposed else "oik,kts->itos"
-        # (kernel, T, S): 1 where that place of the kernel leads from one frame to the other.
+        # (kernel, T, S): 1 where that tap of the kernel leads from input frame to output frame.
         places = (tap == torch.arange(kernel)[:, None, None]).float()
         self.register_buffer("places", places, persistent=False)
 
@@ -142,39 +153,41 @@ class FrameConvolution(nn.Module):
 
 
 class _Level(nn.Module):
-    """Two blocks, and what makes twice or half as many frames of theirs."""
+    """Two blocks, and a convolution that halves or doubles the number of frames."""
 
     def __init__(
-        self, before: int, after: int, told: int, kernel: int, frames: int, resize: nn.Module
+        self, before: int, after: int, condition: int, kernel: int, frames: int, resize: nn.Module
     ) -> None:
         super().__init__()
-        self.first = _Block(before, after, told, kernel, frames)
-        self.second = _Block(after, after, told, kernel, frames)
+        self.first = _Block(before, after, condition, kernel, frames)
+        self.second = _Block(after, after, condition, kernel, frames)
         self.resize = resize
 
-    def forward(self, x: Tensor, told: Tensor) -> tuple[Tensor, Tensor]:
-        x = self.second(self.first(x, told), told)
+    def forward(self, x: Tensor, encoded: Tensor) -> tuple[Tensor, Tensor]:
+        x = self.second(self.first(x, encoded), encoded)
         return x, self.resize(x)
 
 
 class _Block(nn.Module):
-    """Two convolutions with a way past them, the first scaled and moved by what is told."""
+    """A residual block of two convolutions, the first modulated by FiLM of the condition."""
 
-    def __init__(self, before: int, after: int, told: int, kernel: int, frames: int) -> None:
+    def __init__(self, before: int, after: int, condition: int, kernel: int, frames: int) -> None:
         super().__init__()
         self.first = _convolution(before, after, kernel, frames)
         self.second = _convolution(after, after, kernel, frames)
-        self.film = nn.Linear(told, 2 * after)
-        self.past = FrameConvolution(before, after, 1, frames) if before != after else nn.Identity()
+        self.film = nn.Linear(condition, 2 * after)
+        self.shortcut = (
+            FrameConvolution(before, after, 1, frames) if before != after else nn.Identity()
+        )
 
-    def forward(self, x: Tensor, told: Tensor) -> Tensor:
-        scale, move = self.film(told)[..., None].chunk(2, dim=1)
-        out: Tensor = self.second((1 + scale) * self.first(x) + move) + self.past(x)
+    def forward(self, x: Tensor, encoded: Tensor) -> Tensor:
+        gain, bias = self.film(encoded)[..., None].chunk(2, dim=1)
+        out: Tensor = self.second((1 + gain) * self.first(x) + bias) + self.shortcut(x)
         return out
 
 
 class _StepEncoding(nn.Module):
-    """Sines and cosines of the step of the diffusion."""
+    """Sinusoidal embedding of the diffusion step (Vaswani et al., "Attention is all you need")."""
 
     rates: Tensor
 

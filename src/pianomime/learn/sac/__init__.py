@@ -1,1 +1,1 @@
-"""Multi-task reinforcement learning: one policy for all songs, without demonstrations (SAC)."""
+"""Multi-task SAC: one policy for all songs by reinforcement learning, without demonstrations."""

@@ -1,57 +1,51 @@
-"""How one policy learns all songs by trying. Cheap to import: no numpy, no torch."""
+"""Settings of multi-task SAC. Cheap to import: no torch."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pianomime.learn.runs.validation import above_zero, within
+from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.validation import above_zero, within
 
 
 @dataclass(frozen=True)
 class SacConfig:
-    """Soft actor-critic on many songs (paper, appendix G, multi-task RL)."""
+    """Soft actor-critic (Haarnoja et al., 2018) on many songs (paper, appendix G)."""
 
-    frames: int = 500_000
-    """Frames that are played, in all worlds together."""
-    worlds: int = 32
-    """Songs played side by side."""
-    updates: int = 8
-    """Gradient steps for each frame that all worlds have played."""
-    batch: int = 256
-    """Frames in a minibatch."""
-    buffer: int = 200_000
-    """Frames that are remembered."""
+    total_steps: int = 500_000
+    """Control steps in all environments together."""
+    num_envs: int = 32
+    """Number of songs that are played side by side."""
+    gradient_steps: int = 8
+    """Updates for each control step of all environments."""
+    batch_size: int = 256
+    """Transitions in a minibatch."""
+    buffer_size: int = 200_000
+    """Transitions that the replay buffer holds."""
     learning_rate: float = 3e-4
-    """Of actor, critics and temperature."""
+    """Learning rate of actor, critics and temperature."""
     hidden: tuple[int, ...] = (256, 256, 256)
-    """Width of each hidden layer, of the actor and of the critics."""
-    discount: float = 0.9
-    """Of rewards, from frame to frame."""
-    seconds: float = 30.0
-    """Of each song, at most [s]."""
+    """Widths of the hidden layers, in the actor and in the critics."""
+    gamma: float = 0.9
+    """Discount factor of the rewards per control step."""
+    seconds: float = EXCERPT_SECONDS
+    """Longest excerpt of each song [s]."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Seed of all random numbers."""
+
+    def __post_init__(self) -> None:
+        for name in ("total_steps", "num_envs", "gradient_steps", "batch_size"):
+            within(name, getattr(self, name), 1)
+        within("buffer_size", self.buffer_size, self.batch_size)
+        for name in ("learning_rate", "seconds"):
+            above_zero(name, getattr(self, name))
+        within("gamma", self.gamma, 0, 1)
+        within("seed", self.seed, 0)
+        for width in self.hidden:
+            within("hidden", width, 1)
+        within("total_steps", self.total_steps, self.learning_starts + 1)
 
     @property
-    def first(self) -> int:
-        """Frames that are played by chance before anything is learned."""
-        return 10 * self.batch
-
-
-def check_sac(config: SacConfig) -> None:
-    """Refuse settings out of range.
-
-    Raises:
-        InputError: the first of them, as it is called on the command line.
-    """
-    for name in ("frames", "worlds", "updates", "batch"):
-        within(name, getattr(config, name), 1)
-    within("buffer", config.buffer, config.batch)
-    for name in ("learning_rate", "seconds"):
-        above_zero(name, getattr(config, name))
-    within("discount", config.discount, 0, 1)
-    within("seed", config.seed, 0)
-    for width in config.hidden:
-        within("hidden", width, 1)
-    # Before, actions are by chance, and nothing is learned.
-    within("frames", config.frames, config.first + 1)
+    def learning_starts(self) -> int:
+        """Control steps with random actions before the first update."""
+        return 10 * self.batch_size
