@@ -10,7 +10,7 @@ from pianomime.learn.expert.config import preset_config
 from pianomime.learn.expert.expert import train_expert
 
 SONG, SECONDS = "twinkle-twinkle", 1.0
-STEPS = 400  # for a good one, leave the preset's
+STEPS = 200  # for a good one, leave those of the preset
 OUT = Path("out/expert")
 
 
