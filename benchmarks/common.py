@@ -1,4 +1,4 @@
-"""What the benchmarks share: facts about the machine, tables, and the JSON file."""
+"""Common parts of the benchmarks: facts about the machine, tables, and the JSON file."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from pianomime.files import atomic
 ROOT = Path(__file__).resolve().parents[1]
 
 
-def parser(name: str, about: str | None) -> argparse.ArgumentParser:
+def parser(name: str, description: str | None) -> argparse.ArgumentParser:
     """A command line with the options that every benchmark has."""
     made = argparse.ArgumentParser(
-        description=about, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     made.add_argument(
         "-o",
@@ -38,19 +38,19 @@ def cores() -> list[int]:
 
 
 def shared() -> Path:
-    """The folder of reference data, which a user's machine does not have.
+    """The folder of reference data, which is not part of the repository.
 
     Raises:
-        SystemExit: there is none.
+        SystemExit: PIANOMIME_SHARED names no such folder.
     """
     name = os.environ.get("PIANOMIME_SHARED")
     if not name or not Path(name).is_dir():
-        raise SystemExit("skipped: PIANOMIME_SHARED names no folder with the reference data")
+        raise SystemExit("skipped: PIANOMIME_SHARED names no folder of reference data")
     return Path(name)
 
 
 def machine() -> dict[str, Any]:
-    """What somebody needs to know to judge a timing."""
+    """Facts about the machine and the program that a timing depends on."""
     import mujoco
     import numpy as np
 
@@ -71,7 +71,7 @@ def machine() -> dict[str, Any]:
 
 
 def report(path: Path, facts: dict[str, Any], results: dict[str, Any]) -> None:
-    """Write the JSON file and say where it is."""
+    """Write the JSON file, and print its path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic(path) as temporary:
         temporary.write_text(json.dumps({"machine": facts, **results}, indent=2) + "\n", "utf-8")
@@ -79,10 +79,10 @@ def report(path: Path, facts: dict[str, Any], results: dict[str, Any]) -> None:
 
 
 def show_machine(facts: dict[str, Any]) -> None:
-    """Print the facts, and a warning where others are using the machine."""
+    """Print the facts, and a warning if the machine is busy."""
     print("  ".join(f"{name}: {value}" for name, value in facts.items()), end="\n\n")
     if facts["load_before"] > 0.5:
-        print("this machine is busy: timings will be too slow, and those on all cores say little\n")
+        print("this machine is busy: timings are too slow, those on all cores meaningless\n")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:

@@ -1,16 +1,16 @@
-"""How often the search chooses the hand and the finger that people choose.
+"""Agreement of the fingering search with human fingerings.
 
-Needs the reference data (PIANOMIME_SHARED names their folder): the fingered pieces of two sets,
-whole, and the held-out clips of pianists, whose fingering was read off their hands. The search's
-costs are set by hand, for the F1 of what is played, and fitted to none of these fingerings
+Needs the reference data (PIANOMIME_SHARED names its folder): the fingered pieces of two sets,
+whole, and the held-out clips of pianists, whose fingering was read from their hands. The costs of
+the search are set by hand for the F1 of the performance, and fitted to none of these fingerings
 (`fit_fingering.py` tries whether that would help).
 
-- played: the share of the notes that the search gives to some finger.
-- same hand, same finger: the share of all notes with the same hand, or hand and finger, as in the
-  human fingering; a note that the search leaves out counts as different.
-- same finger in the same hand: of those with the same hand.
+- played: share of the notes that the search assigns to a finger.
+- same hand, same finger: share of all notes with the same hand, or hand and finger, as in the human
+  fingering; a note that the search drops counts as different.
+- same finger in the same hand: share of the notes with the same hand.
 
-There is more than one good fingering, and people differ too: 1 is no aim.
+There is more than one good fingering, and people differ too, so that 1 is not the aim.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import common
-from pianomime.keyboard import KEYS
+from pianomime.keyboard import KEYS, LOWEST_PITCH
 from pianomime.music import Score
 from pianomime.plan.fingering import find_fingering
 from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.plan.fingertip_plan import LEFT, RIGHT
 
-_LOWEST_MIDI = 21
-# A note of a fingering and one of the MIDI file at this distance are the same [s].
 _SAME_TIME = 0.005
+"""[s] Greatest distance of a note of a fingering from the same note of the MIDI file."""
 _SETS = ("etude12", "repertoire", "clips")
 
 
@@ -42,7 +41,7 @@ class Piece(NamedTuple):
 
     Attributes:
         score: N notes.
-        hand, finger: (N,) as in a FingertipPlan; -1 where the human's is not known.
+        hand, finger: (N,) as in a FingertipPlan; -1 where that of the human is unknown.
     """
 
     score: Score
@@ -67,7 +66,7 @@ def fingered(folder: Path) -> Iterator[Piece]:
         score = Score.from_midi(folder / f"{name}.mid")
         hand, finger = np.full((2, len(score)), -1)
         for start, _, pitch, _, number in rows[name]:
-            time = np.where(score.key == pitch - _LOWEST_MIDI, np.abs(score.onset - start), np.inf)
+            time = np.where(score.key == pitch - LOWEST_PITCH, np.abs(score.onset - start), np.inf)
             note = int(time.argmin())
             if time[note] < _SAME_TIME:
                 side, finger[note] = divmod(number, 5)

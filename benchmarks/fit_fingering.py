@@ -1,9 +1,9 @@
-"""Do costs learned from human fingerings help?
+"""Costs of the fingering search fitted to human fingerings: whether they agree better.
 
-Random search over the costs of the fingering (each drawn within a factor of four of its default),
-for the share of notes that get the human's hand and finger, on every other piece of the fingered
-repertoire (PIANOMIME_SHARED names the folder of the reference data), first 30 s of each. The best
-are then measured on the other pieces, which had no part in the choice.
+Random search over the costs, each within a factor of four of its default, for the share of notes
+with the human's hand and finger, on the first 30 s of every other piece of the fingered repertoire
+(PIANOMIME_SHARED names the folder of the reference data). The best costs are then measured on the
+other pieces, which had no part in the choice.
 
     python benchmarks/fit_fingering.py --tries 16
 """
@@ -18,11 +18,11 @@ import numpy as np
 
 import common
 from fingering import Count, Piece, compare, fingered
+from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.plan.fingering_cost import FingeringConfig
 
-_SECONDS = 30.0
 _FACTOR = 4.0
-# What decides between fingers; what a lost frame costs is no matter of taste.
+# The costs that decide between fingers; those of lost frames follow from the F1.
 _FITTED = (
     "stretch", "strain", "travel_speed", "hop_speed", "reuse", "thumb_on_black", "weak_finger",
     "crossed",
@@ -32,20 +32,20 @@ _FITTED = (
 def beginning(piece: Piece) -> Piece:
     """The first 30 s of a piece."""
     score = piece.score
-    keep = score.onset < score.onset.min() + _SECONDS
+    keep = score.onset < score.onset.min() + EXCERPT_SECONDS
     part = type(score)(score.key[keep], score.onset[keep], score.offset[keep], score.velocity[keep])
     return Piece(part, piece.hand[keep], piece.finger[keep])
 
 
 def agreement(pieces: list[Piece], config: FingeringConfig, pool: ProcessPoolExecutor) -> Count:
-    """What all pieces have together."""
+    """Sum of the counts of all pieces."""
     counts = list(pool.map(partial(compare, config=config), pieces))
     return Count(*(sum(column) for column in zip(*counts, strict=True)))
 
 
 def main() -> None:
     parser = common.parser("fit_fingering", __doc__)
-    parser.add_argument("--tries", type=int, default=16, help="sets of costs drawn (%(default)s)")
+    parser.add_argument("--tries", type=int, default=16, help="random sets of costs (%(default)s)")
     arguments = parser.parse_args()
     pieces = [beginning(piece) for piece in fingered(common.shared() / "data" / "repertoire")]
     fitted, kept_out = pieces[::2], pieces[1::2]
@@ -55,8 +55,8 @@ def main() -> None:
     default = FingeringConfig()
     configs = [default]
     for _ in range(arguments.tries):
-        drawn = _FACTOR ** rng.uniform(-1.0, 1.0, len(_FITTED))
-        factors = dict(zip(_FITTED, drawn, strict=True))
+        exponents = rng.uniform(-1.0, 1.0, len(_FITTED))
+        factors = dict(zip(_FITTED, _FACTOR**exponents, strict=True))
         configs.append(
             replace(default, **{name: getattr(default, name) * factors[name] for name in _FITTED})
         )

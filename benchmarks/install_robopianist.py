@@ -1,8 +1,7 @@
 """Make an environment in which RoboPianist 1.0.10 runs, for `speed_world.py` to compare with.
 
-RoboPianist asks for PyAudio and pyfluidsynth, which build on system libraries (PortAudio,
-FluidSynth) and serve only to play sound aloud. Two empty modules of ours stand in for them;
-nothing else of RoboPianist is touched.
+RoboPianist requires PyAudio and pyfluidsynth, which need system libraries (PortAudio, FluidSynth)
+and only play sound. Two empty modules replace them; nothing else of RoboPianist is changed.
 
     python benchmarks/install_robopianist.py [--environment .cache/robopianist] [--learning]
 
@@ -32,10 +31,10 @@ DEPENDENCIES = (
     "tqdm==4.70.1",
 )
 LEARNING = ("gymnasium==1.4.0", "stable-baselines3==2.9.2", "torch==2.13.0")
-# Without its own requirements, because they name the two sound libraries.
+# Installed without its requirements, because they include the two sound libraries.
 ROBOPIANIST = "robopianist==1.0.10"
 STAND_INS = ("pyaudio", "fluidsynth")
-STAND_IN = '"""Stands in for a sound library that needs system packages; nothing here plays."""\n'
+STAND_IN = '"""Replaces a sound library that needs system packages; no sound is played."""\n'
 CHECK = """
 from robopianist import suite
 environment = suite.load("RoboPianist-debug-TwinkleTwinkleRousseau-v0")

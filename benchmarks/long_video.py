@@ -1,13 +1,12 @@
-"""How much memory `pianomime retarget` takes for videos of hours.
+"""Memory of `pianomime retarget` for videos of hours.
 
     python benchmarks/long_video.py --hours 0.5 1 4
 
-A minute of made-up playing (640 x 360, 20 frames/s, keys light up) over and over, with a MIDI file
-and without. In MediaPipe's place stands one who knows where the hands were drawn; what
-MediaPipe itself takes comes on top, and is not measured here. The whole keyboard is seen: where a
-part is, and a MIDI file decides the octave, each octave that it may be takes a temporary file of
-its own. Each length has a process of its own, whose greatest resident memory is told; the video is
-made in another one before.
+A minute of synthetic playing (640 x 360, 20 frames/s, keys light up) is repeated, with a MIDI file
+and without. MediaPipe is replaced by the positions at which the hands were drawn, so its own memory
+is not measured. The whole keyboard is visible; where only a part is, and a MIDI file decides the
+octave, each possible octave takes a temporary file. The peak resident memory of each length is that
+of a process of its own; the video is made by another process before.
 """
 
 from __future__ import annotations
@@ -28,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import common
+from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
 from pianomime.video import retarget as room
 from pianomime.video.hands.sightings import Sighting
@@ -35,7 +35,7 @@ from pianomime.video.overlay import write_overlay
 from pianomime.video.retarget import RetargetConfig, retarget
 from pianomime.video.summary import write_summary
 
-sys.path.append(str(common.ROOT / "tests" / "video"))
+sys.path.append(str(common.ROOT / "tests"))
 
 SIZE = (640, 360)
 LOOP = 60.0
@@ -60,10 +60,10 @@ def main() -> None:
     common.report(given.output, facts, {"long_video": rows})
 
 
-def _alone(work: Callable[..., Any], *about: Any) -> Any:
-    """What work gives in a process of its own."""
+def _alone(work: Callable[..., Any], *arguments: Any) -> Any:
+    """The result of a function in a process of its own."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        return pool.submit(work, *about).result()
+        return pool.submit(work, *arguments).result()
 
 
 def _make(folder: Path, hours: float) -> None:
@@ -84,14 +84,14 @@ def _retarget(folder: Path, hours: float, with_midi: bool, overlay: bool) -> dic
     import made_up_video as made_up
 
     class Hands(made_up.TrueHands):
-        """Those of a minute, over and over."""
+        """The hands of one minute, repeated."""
 
         def detect(self, picture: NDArray[np.uint8], milliseconds: int) -> list[Sighting]:
             return super().detect(picture, milliseconds % round(1000 * LOOP))
 
     video, midi, model = (folder / f"{hours}.mp4", folder / f"{hours}.mid", folder / "no.task")
     model.touch()
-    points = made_up.plan_of(made_up.song(LOOP)).fingertips[: round(20 * LOOP), :, :, :2]
+    points = made_up.plan_of(made_up.song(LOOP)).fingertips[: round(FRAME_RATE * LOOP), :, :, :2]
     detector = Hands(made_up.camera(SIZE), SIZE, points)
     before = _peak()
     began = time.perf_counter()
@@ -113,7 +113,7 @@ def _retarget(folder: Path, hours: float, with_midi: bool, overlay: bool) -> dic
 
 
 def _repeat(short: Path, video: Path, times: int) -> None:
-    """Write the same packets over and over: nothing is encoded anew."""
+    """Repeat the packets of a video, without encoding them again."""
     with av.open(str(short)) as source:
         stream = source.streams.video[0]
         packets = [packet for packet in source.demux(stream) if packet.dts is not None]

@@ -1,10 +1,11 @@
-"""Measure how near and how far two fingers of a hand can hold keys; writes `plan/reach.json`.
+"""Measure at which distances two fingers of a hand can hold keys, and write `plan/reach.json`.
 
-For every two fingers, on white or black keys: the smallest and the largest distance along the
+For every two fingers on white or black keys: the smallest and the largest distance along the
 keyboard at which inverse kinematics of the hand takes both within 3 mm of their targets. The
-smallest is mostly negative: the fingers are crossed, for the hands of this world do not collide
-with themselves. Right hand, thumb on the bass side; the left hand is its mirror image. Also where
-the fingertips of a hand at ease lie, from its middle finger. About a minute on two cores.
+smallest is mostly negative, that is, the fingers are crossed, since the fingers of a hand do not
+collide with each other. Right hand, thumb on the bass side; the left hand is its mirror image. Also
+the distances of the fingertips of a relaxed hand from its middle finger. About a minute on two
+cores.
 
     python benchmarks/reach.py
 """
@@ -25,21 +26,21 @@ from pianomime.plan import reach
 from pianomime.plan.fingertip_plan import FINGERS
 from pianomime.plan.joint_path import BLACK_REST, HOME, WHITE_REST, PathConfig, smooth_path
 from pianomime.world.hand import Hand
-from pianomime.world.layout import LAYOUT
+from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 
 _FILE = Path(reach.__file__).with_name("reach.json")
 _WITHIN = 0.003  # [m]
-_STEP = 0.003  # [m] of the distances tried
-_NEAREST, _FARTHEST = -0.18, 0.33  # [m]; beyond what any two fingers reach
+_STEP = 0.003  # [m] between the distances tried
+_NEAREST, _FARTHEST = -0.18, 0.33  # [m] beyond the reach of any two fingers
 _WHITE_X = (0.030, 0.050, 0.070)  # [m] where a white key is struck, in front of the black ones
 _BLACK_X = (-0.065, -0.025, 0.010)
-_PRESSED = 0.009  # [m] that a fingertip goes down with its key
+_PRESSED = 0.009  # [m] way down of a fingertip with its key
 
 
 def distances(low: int, high: int, low_black: bool, high_black: bool) -> tuple[float, float]:
     """The smallest and the largest distance [m] at which two fingers reach their targets."""
     hand = Hand("rh")
-    # Posture hardly counts: what the joints allow is asked, not what is comfortable.
+    # Posture hardly counts, because the limits of the joints are measured, not comfort.
     config = PathConfig(
         posture=30.0, slide_posture=1.0, coupling=0.5, damping=0.5, iterations=30,
         joint_acceleration=1e6, slide_acceleration=1e6,
@@ -47,8 +48,8 @@ def distances(low: int, high: int, low_black: bool, high_black: bool) -> tuple[f
     tried = np.arange(_NEAREST, _FARTHEST, _STEP)
     reached = np.zeros(len(tried), bool)
     for low_x, high_x in product(_xs(low_black), _xs(high_black)):
-        targets = np.zeros((len(tried), 6, 3))
-        weights = np.zeros((len(tried), 6, 3))
+        targets = np.zeros((len(tried), POINT_COUNT, 3))
+        weights = np.zeros((len(tried), POINT_COUNT, 3))
         for finger, x, black, side in (
             (low, low_x, low_black, -0.5),
             (high, high_x, high_black, 0.5),
@@ -57,7 +58,7 @@ def distances(low: int, high: int, low_black: bool, high_black: bool) -> tuple[f
             targets[:, 1 + finger] = [x, 0.0, height]
             targets[:, 1 + finger, 1] = side * tried
             weights[:, 1 + finger] = 1 / 0.0005
-        clearance = np.full((len(tried), 5), np.nan)
+        clearance = np.full((len(tried), FINGER_COUNT), np.nan)
         path = smooth_path(hand, np.zeros(LAYOUT.hand_joints), targets, weights, clearance, config)
         points = np.array([hand.points(pose) for pose in path[1:]])
         error = np.linalg.norm((points - targets)[:, [1 + low, 1 + high]], axis=-1).max(axis=1)
@@ -76,7 +77,7 @@ def main() -> None:
     hand = Hand("rh")
     along = hand.points(np.clip(HOME, hand.low, hand.high))[1:, 1]
     colours = list(product((False, True), repeat=2))
-    pairs = [(*fingers, *on) for fingers in combinations(range(5), 2) for on in colours]
+    pairs = [(*fingers, *on) for fingers in combinations(range(FINGER_COUNT), 2) for on in colours]
     with ProcessPoolExecutor(len(common.cores())) as pool:
         found = list(pool.map(distances, *zip(*pairs, strict=True)))
     rows = [

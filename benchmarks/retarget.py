@@ -1,7 +1,7 @@
-"""How well a video becomes a demonstration: against a reference made by hand, and known truth.
+"""Accuracy of demonstrations made from videos, against a reference made by hand and known truth.
 
-    python benchmarks/retarget.py                    made-up videos
-    python benchmarks/retarget.py --rendered         films of our own world (needs OpenGL)
+    python benchmarks/retarget.py                    synthetic videos
+    python benchmarks/retarget.py --rendered         videos of our own world (needs OpenGL)
     python benchmarks/retarget.py --reference FOLDER --hand-model FILE
 
 FOLDER holds one video (.mp4), its MIDI file (.mid) and reference.npz: homography (3, 3) from pixels
@@ -23,7 +23,8 @@ from unittest.mock import patch
 import numpy as np
 
 import common
-from pianomime import Performance, Player, excerpt, songs
+from pianomime import Performance, excerpt, load_player, songs
+from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.music import Score, onset_f1
 from pianomime.plan.demonstration import Demonstration
 from pianomime.video import retarget as room
@@ -33,7 +34,7 @@ from pianomime.video.retarget import RetargetConfig, retarget
 from pianomime.video.summary import write_summary
 from pianomime.world.parameters import key_centres
 
-sys.path.append(str(common.ROOT / "tests" / "video"))
+sys.path.append(str(common.ROOT / "tests"))
 
 SMALL, LARGE, HD = (640, 360), (1280, 720), (1920, 1080)
 MADE_UP: dict[str, dict[str, Any]] = {
@@ -101,7 +102,7 @@ def _against_reference(folder: Path, model: Path | None) -> dict[str, Any]:
     tips = made.tracks.points[:rows, :, 1:] - reference["fingertips"][:, :, 1:, :2]
 
     read = retarget(video, RetargetConfig(hand_model=model)).demonstration.score
-    # The music goes on in the video after the MIDI file ends: nothing tells what is right there.
+    # After the end of the MIDI file the music in the video goes on, and nothing is known of it.
     heard = read.onset <= shown.score.onset.max() + 0.1
     table: dict[str, Any] = {
         "homography, median [mm]": float(np.median(off)),
@@ -120,7 +121,7 @@ def _against_reference(folder: Path, model: Path | None) -> dict[str, Any]:
             config = RetargetConfig(midi=midi, hand_model=model, align="paper")
             shown = retarget(video, config).demonstration
         for name, effort in (("demonstration-ik", 0), ("demonstration", 0), ("demonstration", 1)):
-            player = Player.from_demonstration(shown, name, effort)
+            player = load_player(name, effort, demonstration=shown)
             f1 = player.play(shown.score).metrics()["f1"]
             table[f"F1, {name}, effort {effort}, --align {rule}"] = f1
     return table
@@ -135,7 +136,7 @@ def _equal_fingering(shown: Demonstration, reference: Any) -> float:
     spans = notes.note_frames()
     for key, (first, end) in zip(notes.key, spans, strict=True):
         mine = np.flatnonzero(shown.score.key == key)
-        nearest = mine[np.abs(shown.score.onset[mine] - first / 20).argmin()]
+        nearest = mine[np.abs(shown.score.onset[mine] - first / FRAME_RATE).argmin()]
         finger = shown.plan.note_finger[nearest] + 5 * (shown.plan.note_hand[nearest] == 0)
         cells = wanted[first:end, key]
         total += len(cells)
@@ -216,8 +217,8 @@ def _rendered(song: str, lit: bool) -> dict[str, Any]:
         rendered_video.write(video, performance, lit)
         played.to_midi(midi)
         model.touch()
-        told = rendered_video.hands(performance)
-        with patch.object(room, "HandDetector", lambda _: told):
+        hands = rendered_video.hands(performance)
+        with patch.object(room, "HandDetector", lambda _: hands):
             made = retarget(video, RetargetConfig(midi=midi, hand_model=model))
             read = retarget(video, RetargetConfig(hand_model=model)).demonstration
     plane = rendered_video.camera()
@@ -240,12 +241,12 @@ def _rendered(song: str, lit: bool) -> dict[str, Any]:
 @cache
 def _performance(song: str) -> Performance:
     score = excerpt(Score.from_midi(songs.path(song)), seconds=12)
-    return Player.from_name("zero-shot", 0).play(score)
+    return load_player("zero-shot", 0).play(score)
 
 
 def _moved(score: Score, semitones: int) -> Score | None:
     key = score.key + semitones
-    return replace(score, key=key) if len(key) and key.min() >= 0 and key.max() < 88 else None
+    return replace(score, key=key) if len(key) and key.min() >= 0 and key.max() < KEYS else None
 
 
 if __name__ == "__main__":

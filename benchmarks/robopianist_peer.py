@@ -1,4 +1,4 @@
-"""RoboPianist in a process of its own, idle unless asked: a line of JSON in, a line out."""
+"""RoboPianist in a process of its own: each request and each answer is one line of JSON."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ class RobopianistPeer:
     Args:
         python: the Python of that environment, see `install_robopianist.py`.
         worker: name of the script beside this file.
-        arguments: its command line.
+        arguments: arguments of the script.
 
     Attributes:
-        facts: what it says of itself when it is ready.
+        facts: its first answer, when it is ready.
     """
 
     def __init__(self, python: Path, worker: str, *arguments: str) -> None:
@@ -32,14 +32,14 @@ class RobopianistPeer:
         self.facts = self._answer()
 
     def ask(self, mode: str) -> dict[str, Any]:
-        """Have it work in a mode, and wait for what it says."""
+        """Let it work in a mode, and wait for its answer."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps({"mode": mode}) + "\n")
         self._process.stdin.flush()
         return self._answer()
 
     def pin(self, core: int) -> None:
-        """Keep it on one core."""
+        """Restrict it to one core."""
         os.sched_setaffinity(self._process.pid, {core})
 
     def close(self) -> None:
@@ -52,6 +52,6 @@ class RobopianistPeer:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            raise RuntimeError("RoboPianist's process ended; its error is above")
+            raise RuntimeError("RoboPianist's process has ended; its error is above")
         answer: dict[str, Any] = json.loads(line)
         return answer

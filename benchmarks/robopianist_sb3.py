@@ -1,8 +1,8 @@
-"""RoboPianist's side of `speed_learn.py`; runs in RoboPianist's own Python, started by it.
+"""RoboPianist's side of `speed_learn.py`, which starts it in RoboPianist's own Python.
 
 Its environment, with the options of PianoMime's published code as in `robopianist_worker.py`, in
-Stable-Baselines3's SubprocVecEnv: what its users have. Talks in lines of JSON: says what it is once
-it is ready, then answers each request ("environment" or "ppo") with steps and seconds.
+Stable-Baselines3's SubprocVecEnv, as its users run it. Messages are lines of JSON: first the sizes
+of observation and action, then steps and seconds for each request ("environment" or "ppo").
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from robopianist_worker import load, stiffen
 
 
 class RoboPianistEnv(gymnasium.Env):
-    """dm_control's environment as Gymnasium wants it, observations in one row."""
+    """dm_control's environment for Gymnasium, with observations in one row."""
 
     def __init__(self) -> None:
         self.environment = load()
@@ -53,8 +53,8 @@ def main() -> None:
     torch.set_num_threads(threads)
     vec = SubprocVecEnv([RoboPianistEnv] * envs, start_method="spawn")
     vec.reset()
-    draw = np.random.default_rng(0)
-    actions = draw.uniform(-1, 1, (steps, envs, *vec.action_space.shape)).astype(np.float32) * 0.1
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (steps, envs, *vec.action_space.shape)).astype(np.float32) * 0.1
     model = PPO(
         "MlpPolicy",
         vec,
@@ -68,19 +68,19 @@ def main() -> None:
         device="cpu",
     )
 
-    def say(**words: Any) -> None:
-        print(json.dumps(words), flush=True)
+    def send(**message: Any) -> None:
+        print(json.dumps(message), flush=True)
 
-    say(observations=vec.observation_space.shape[0], actions=vec.action_space.shape[0])
+    send(observations=vec.observation_space.shape[0], actions=vec.action_space.shape[0])
     for line in sys.stdin:
         start = time.perf_counter()
         if json.loads(line)["mode"] == "environment":
             for action in actions:
                 vec.step(action)
-            say(steps=steps * envs, seconds=time.perf_counter() - start)
+            send(steps=steps * envs, seconds=time.perf_counter() - start)
         else:
             model.learn(update)
-            say(steps=update, seconds=time.perf_counter() - start)
+            send(steps=update, seconds=time.perf_counter() - start)
     vec.close()
 
 

@@ -1,12 +1,12 @@
-"""RoboPianist's side of `speed_world.py`; runs in RoboPianist's own Python, started by it.
+"""RoboPianist's side of `speed_world.py`, which starts it in RoboPianist's own Python.
 
-Talks in lines of JSON: says what it is once it is ready, then answers each request for a mode
-("environment", "physics" or "census") with what running all the controls in that mode gave.
+Messages are lines of JSON: first its versions, then, for each request of a mode ("environment",
+"physics" or "census"), the result of running all controls in that mode.
 
-RoboPianist's own suite loads its environment, with the options and ranges that PianoMime's
-published code sets, so that the very controls that `World` gets move its hands the same way over
-the same keys: a third forearm slide, gravity compensation, no collisions of hands with hands, a
-longer reach, and forearm actuators three times as stiff.
+RoboPianist's suite loads its environment with the options and ranges of PianoMime's published code,
+so that the controls given to `World` move its hands in the same way over the same keys: a third
+forearm slide, gravity compensation, no collisions between hands, a longer reach, and forearm
+actuators three times as stiff.
 """
 
 from __future__ import annotations
@@ -112,10 +112,10 @@ class Worker:
 def main() -> None:
     worker = Worker(np.load(sys.argv[1]))
 
-    def say(**words: Any) -> None:
-        print(json.dumps(words), flush=True)
+    def send(**message: Any) -> None:
+        print(json.dumps(message), flush=True)
 
-    say(
+    send(
         mujoco=mujoco.__version__,
         nq=int(worker.model.nq),
         nu=int(worker.model.nu),
@@ -127,9 +127,9 @@ def main() -> None:
     for line in sys.stdin:
         mode = json.loads(line)["mode"]
         if mode == "census":
-            say(**worker.census())
+            send(**worker.census())
         else:
-            say(seconds=modes[mode]())
+            send(seconds=modes[mode]())
 
 
 if __name__ == "__main__":

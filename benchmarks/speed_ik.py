@@ -1,7 +1,8 @@
-"""What a tracker costs a frame: the paper's IK, and IK with inverse dynamics.
+"""Time of a tracker per frame: the paper's IK, and the dynamic tracker.
 
-The zero-shot planner's fingertips for a bundled song are tracked in a World, on one core. Timed
-are `begin`, shared out over the frames, and every `control`; the World's own steps are not.
+The zero-shot planner's fingertips of a bundled song are tracked in a World, on one core. The time
+of `start`, divided by the frames, and that of every `control` is measured, without the World's
+steps.
 """
 
 from __future__ import annotations
@@ -26,20 +27,20 @@ TRACKERS: dict[str, Callable[[], Tracker]] = {"ik": IkTracker, "dynamic": Dynami
 
 
 def measure(tracker: Tracker, plan: FingertipPlan) -> dict[str, float]:
-    """Milliseconds a frame of one tracker."""
+    """Milliseconds per frame of one tracker."""
     world = World()
     start = time.perf_counter()
     controller = tracker.start(plan)
-    begin = time.perf_counter() - start
+    starting = time.perf_counter() - start
     control = np.empty(len(plan))
     for frame in range(len(plan)):
         start = time.perf_counter()
         ctrl = controller.control(frame, world)
         control[frame] = time.perf_counter() - start
         world.step(ctrl)
-    each = begin / len(plan) + control.mean()
+    each = starting / len(plan) + control.mean()
     return {
-        "begin_ms": 1e3 * begin / len(plan),
+        "start_ms": 1e3 * starting / len(plan),
         "control_ms_median": 1e3 * float(np.median(control)),
         "control_ms_99": 1e3 * float(np.percentile(control, 99)),
         "control_ms_slowest": 1e3 * float(control.max()),
@@ -62,7 +63,7 @@ def main() -> None:
         for name, make in TRACKERS.items():
             runs[name].append(measure(make(), plan))
     medians: dict[str, Any] = {
-        name: {figure: float(np.median([run[figure] for run in ran])) for figure in ran[0]}
+        name: {each: float(np.median([run[each] for run in ran])) for each in ran[0]}
         for name, ran in runs.items()
     }
     print(
@@ -71,14 +72,14 @@ def main() -> None:
     common.table(
         (
             "tracker",
-            "begin [ms/frame]",
+            "start [ms/frame]",
             "control, median [ms]",
             "99 %",
             "slowest",
             "together [ms/frame]",
             "times real time",
         ),
-        [(name, *figures.values()) for name, figures in medians.items()],
+        [(name, *row.values()) for name, row in medians.items()],
     )
     common.report(
         arguments.output,

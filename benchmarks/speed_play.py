@@ -1,7 +1,7 @@
-"""Time and memory of `pianomime play`, without the film, on as many cores as asked for.
+"""Time and memory of `pianomime play`, without the video, on a number of cores.
 
-Every song is played by the command itself in a fresh process: peak memory and whole time are that
-process's own, with imports, sound and report; planning and simulating are what its report says.
+Every song is played by the command in a new process. Peak memory and whole time are those of that
+process, with imports, sound and report; the times of planning and simulating are from its report.
 The real-time factor is song / (planning + simulating).
 """
 
@@ -19,12 +19,13 @@ from typing import Any
 
 import common
 from pianomime import songs
-from pianomime.players.player import EFFORT
+from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.players.registry import EFFORT
 from pianomime.songs.find import find_songs
 
 
 def play(song: Path, seconds: float, effort: int, cores: list[int]) -> dict[str, Any]:
-    """The figures of one song, or its error."""
+    """The measurements of one song, or its error."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "out")
         start = time.perf_counter()
@@ -49,7 +50,7 @@ def play(song: Path, seconds: float, effort: int, cores: list[int]) -> dict[str,
         row = json.loads((out / "report.json").read_text("utf-8"))
     wanted = ("song", "song_seconds", "f1", "plan_seconds", "simulate_seconds", "realtime_factor")
     return {
-        **{figure: row[figure] for figure in wanted},
+        **{name: row[name] for name in wanted},
         "whole_seconds": took,
         "peak_mib": usage.ru_maxrss / 1024,  # Linux counts KiB
     }
@@ -60,7 +61,9 @@ def main() -> None:
     options.add_argument(
         "songs", nargs="*", help="bundled songs, MIDI files or folders (all bundled songs)"
     )
-    options.add_argument("--seconds", type=float, default=30.0, help="of each song (%(default)s)")
+    options.add_argument(
+        "--seconds", type=float, default=EXCERPT_SECONDS, help="of each song (%(default)s)"
+    )
     options.add_argument("--rounds", type=int, default=1)
     options.add_argument("--effort", type=int, default=EFFORT, help="0 to 3 (%(default)s)")
     options.add_argument("--cores", type=int, default=1, help="to play on (%(default)s)")
@@ -81,13 +84,13 @@ def main() -> None:
         print(".", end="", flush=True)
     print("\n")
     played = [row for row in rows if "error" not in row]
-    figures = [name for name in played[0] if name != "song"] if played else []
-    lines = [(row["song"], *(row[name] for name in figures)) for row in played]
+    names = [name for name in played[0] if name != "song"] if played else []
+    lines = [(row["song"], *(row[name] for name in names)) for row in played]
     if played:
-        lines.append(("median", *(statistics.median(row[n] for row in played) for n in figures)))
-        lines.append(("lowest", *(min(row[name] for row in played) for name in figures)))
-        lines.append(("highest", *(max(row[name] for row in played) for name in figures)))
-    common.table(("song", *figures), lines)
+        lines.append(("median", *(statistics.median(row[n] for row in played) for n in names)))
+        lines.append(("lowest", *(min(row[name] for row in played) for name in names)))
+        lines.append(("highest", *(max(row[name] for row in played) for name in names)))
+    common.table(("song", *names), lines)
     for row in rows:
         if "error" in row:
             print(f"{row['song']}: {row['error']}")

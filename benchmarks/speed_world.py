@@ -1,11 +1,11 @@
-"""Control steps per second of World, of WorldBatch, and of RoboPianist beside them.
+"""Control steps per second of World, WorldBatch and RoboPianist.
 
-All of them simulate the same scene under the same controls in turns, several rounds of it, so
-that whatever else the machine does hits them alike; medians count. A control step is 0.05 s, ten
-physics steps. Workloads: `waving`, hands that swing and press keys; `song`, the controls of a
-zero-shot performance of a bundled song; and, where PIANOMIME_SHARED names a folder that has
-`data/pianomime/experts.npz`, `expert`, the recorded controls of trained experts. What is timed,
-everything but WorldBatch on one core:
+All simulate the same scene with the same controls, in turns and in several rounds, so that other
+work of the machine affects them alike; medians are reported. A control step is 0.05 s, ten physics
+steps. Workloads: `waving`, hands that swing and press keys; `song`, the controls of a zero-shot
+performance of a bundled song; and, where PIANOMIME_SHARED names a folder with
+`data/pianomime/experts.npz`, `expert`, the recorded controls of trained experts. Timed are, all but
+WorldBatch on one core:
 
 - World: `World.step`, then reading the hands' positions, the key states and the pressed keys
 - World, step only: `World.step` alone
@@ -13,10 +13,10 @@ everything but WorldBatch on one core:
 - RoboPianist: `env.step` of its own environment, that is physics, observations and reward
 - RoboPianist, physics only: plain `mj_step` on RoboPianist's own compiled model, in its MuJoCo
 
-RoboPianist (1.0.10, in MuJoCo 3.3.7) runs in a Python of its own, which
-`benchmarks/install_robopianist.py` makes; without it, only ours are timed. Its environment gets
-the options of PianoMime's published code, which make its scene the same as ours. Pressed keys and
-contacts are counted on both sides, to show that both do the same work.
+RoboPianist (1.0.10, in MuJoCo 3.3.7) runs in a Python environment of its own, which
+`benchmarks/install_robopianist.py` makes; without it, only World and WorldBatch are timed. The
+options of PianoMime's published code make its scene the same as that of World. Pressed keys and
+contacts are counted in both, to show that both do the same work.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 import common
 import workload
+from pianomime import load_player
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.world import World, WorldBatch
 from robopianist_peer import RobopianistPeer
@@ -119,11 +120,10 @@ def song_controls(name: str) -> Controls:
     """The controls of a zero-shot performance."""
     from pianomime.music import Score
     from pianomime.music.excerpt import excerpt
-    from pianomime.players.player import Player
     from pianomime.songs.find import find_song
 
     score = excerpt(Score.from_midi(find_song(name)))
-    controls: Controls = Player.from_name("zero-shot").play(score).ctrl
+    controls: Controls = load_player("zero-shot").play(score).ctrl
     return controls
 
 

@@ -1,8 +1,8 @@
-"""The F1 of a perfect player with these two hands: what no ten fingers could hold is left out.
+"""F1 of a perfect player with these two hands, which leaves out what ten fingers cannot hold.
 
-Needs the reference data (PIANOMIME_SHARED names their folder). Every frame of the first 30 s of
-each song is looked at on its own, as if the hands had all the time in the world to get there, so
-what is reported is an upper bound. A key-frame is out of reach by
+Needs the reference data (PIANOMIME_SHARED names its folder). Every frame of the first 30 s of each
+song is considered on its own, as if the hands could move there in no time, so that the result is
+an upper bound. A key-frame is out of reach by
 
 - count: there are more than ten keys to hold, or
 - reach: no choice of fingers can hold them all at once. Each hand holds at most five keys, a

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# Mean and spread of the control of each actuator [rad, m], as rounded figures of piano playing
-# with this hand (statistics over expert performances); the fingers share theirs.
+# Mean and standard deviation of the control of each actuator [rad, m], rounded, over performances
+# of experts with this hand; all fingers but the thumb share those of their last joints.
 _POSTURE = {
     "WRJ2": (-0.23, 0.19),
     "WRJ1": (0.09, 0.14),
@@ -26,17 +26,17 @@ _POSTURE = {
     "forearm_ty": (0.01, 0.03),
     "forearm_tz": (-0.026, 0.016),
 }
-_SLOWEST, _FASTEST = 0.7, 1.6  # [Hz] of the fingers; forearms go at a third of it
+_SLOWEST, _FASTEST = 0.7, 1.6  # [Hz] of fingers; those of forearms are a third
 _GOLDEN = 0.6180339887498949
 
 
 def waving(names: list[str], frames: int, dt: float) -> NDArray[np.float64]:
-    """Every actuator swings about its posture at a pace of its own.
+    """Controls of actuators that swing about a mean, each at a frequency of its own.
 
     Args:
-        names: of the actuators; what they end in says which joint they move.
+        names: names of the actuators, which end with those of their joints.
         frames: number of control steps.
-        dt: time between them [s].
+        dt: length of a control step [s].
 
     Returns:
         (frames, len(names)) targets [rad, m].
@@ -46,11 +46,11 @@ def waving(names: list[str], frames: int, dt: float) -> NDArray[np.float64]:
     for index, name in enumerate(names):
         suffix = next(suffix for suffix in _POSTURE if name.endswith(suffix))
         middle, spread = _POSTURE[suffix]
-        # Multiples of the golden ratio never fall into step with each other.
+        # Multiples of the golden ratio are spread evenly, and no two are alike.
         share = (index * _GOLDEN) % 1.0
-        pace = _SLOWEST + (_FASTEST - _SLOWEST) * share
+        frequency = _SLOWEST + (_FASTEST - _SLOWEST) * share
         if "forearm" in name:
-            pace /= 3.0
-        swing = np.sin(2.0 * np.pi * (pace * time + (index * _GOLDEN**2) % 1.0))
+            frequency /= 3.0
+        swing = np.sin(2.0 * np.pi * (frequency * time + (index * _GOLDEN**2) % 1.0))
         controls[:, index] = middle + np.sqrt(2.0) * spread * swing
     return controls

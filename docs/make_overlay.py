@@ -24,7 +24,7 @@ from pianomime.video.film.film import Film
 from pianomime.video.overlay import write_overlay
 from pianomime.video.retarget import RetargetConfig, retarget
 
-sys.path.append(str(Path(__file__).parents[1] / "tests" / "video"))
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
 
 import rendered_video
 
