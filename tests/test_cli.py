@@ -14,6 +14,7 @@ import pytest
 
 from pianomime import songs
 from pianomime.cli import COMMANDS, main
+from pianomime.errors import TrainingDiverged
 
 
 @pytest.fixture(autouse=True)
@@ -194,6 +195,19 @@ def test_nothing_is_said_where_nobody_reads_on(arguments: list[str]) -> None:
     os.close(writer)
     assert done.returncode == 141
     assert done.stderr == ""
+
+
+def test_work_that_failed_is_one_line_and_not_bad_input(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def diverges(_: object) -> None:
+        raise TrainingDiverged("the loss is not a finite number at step 5")
+
+    monkeypatch.setattr("pianomime.commands.songs.Songs.run", diverges)
+    with pytest.raises(SystemExit) as stopped:
+        main(["songs"])
+    assert stopped.value.code == 1
+    assert capsys.readouterr().err == "pianomime: the loss is not a finite number at step 5\n"
 
 
 def test_an_unknown_command_is_refused_with_a_list(capsys: pytest.CaptureFixture[str]) -> None:
