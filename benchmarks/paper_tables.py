@@ -3,10 +3,10 @@
     PIANOMIME_WEIGHTS=out/generalist python benchmarks/paper_tables.py -o out/tables
     python benchmarks/paper_tables.py --weights out/one out/two out/three --headline two-stage-diff
 
-Plays all songs of both sets with every method whose weights are there, thrice with other draws if
-it draws, and the headline method so with the weights of each training. OUT then holds songs.csv (a
-row for each playing), tables.md (the main comparison, tables 9 and 10, and F1 of all songs and
-players) and methods.png. What was played before, by the same program and weights, is not played
+Plays all songs of both sets with every method whose weights are there, with three seeds if it is
+stochastic, and the headline method with the weights of several trainings. OUT then holds songs.csv
+(a row for each performance), tables.md (the main comparison, tables 9 and 10, and F1 of all songs
+and players) and methods.png. Songs that the same program and weights played before are not played
 again. Figure 8 of the paper is drawn by `pianomime train-experts`.
 """
 
@@ -24,9 +24,9 @@ import common
 from pianomime.errors import InputError
 from pianomime.evaluation.evaluation import evaluate
 from pianomime.files import atomic
-from pianomime.policies.methods import FINGERS, METHODS, WEIGHTS, weight_files
+from pianomime.policies.methods import FINGERS, GENERALISTS, WEIGHTS, weight_files
 
-FIGURES = ("precision", "recall", "f1")
+METRICS = ("precision", "recall", "f1")
 SETS = {"modern test12": "modern/test12", "Etude-12": "etude12"}
 
 # Table 1 of the paper, and the means of its table 10: precision, recall and F1 of each set.
@@ -78,7 +78,16 @@ Row = dict[str, Any]
 def play(
     method: str, weights: Path | None, seed: int, effort: int, songs: str, arguments: Any
 ) -> list[Row]:
-    """A row for each song of a set."""
+    """A row for each song of a set.
+
+    Args:
+        method: name of the player.
+        weights: folder of its weights; None for the usual one.
+        seed: of the player.
+        effort: of the player.
+        songs: name of the set.
+        arguments: of the command line.
+    """
     if weights is not None:
         os.environ[WEIGHTS] = str(weights)
     results = evaluate(
@@ -102,14 +111,14 @@ def play(
             "seed": seed,
             "set": songs,
             "song": song["song"],
-            **{name: song[name] for name in (*FIGURES, "realtime_factor")},
+            **{name: song[name] for name in (*METRICS, "realtime_factor")},
         }
         for song in results["songs"]
     ]
 
 
-def there(method: str) -> bool:
-    """Whether the weights of a method are; if not, says so."""
+def available(method: str) -> bool:
+    """Whether the weights of a method are there; prints so if not."""
     try:
         weight_files(method)
     except InputError as error:
@@ -119,10 +128,10 @@ def there(method: str) -> bool:
 
 
 def seeds_of(method: str, effort: int, arguments: Any) -> tuple[int, ...]:
-    """Of what a player draws: by a diffusion, or in a search."""
-    if method in METHODS:
-        drawn = METHODS[method] not in (("bc-mse",), ("multi-task-sac",))
-        return tuple(arguments.seeds) if drawn else (0,)
+    """Seeds of a player: of its diffusion, or of its predictive sampling."""
+    if method in GENERALISTS:
+        stochastic = GENERALISTS[method] not in (("bc-mse",), ("multi-task-sac",))
+        return tuple(arguments.seeds) if stochastic else (0,)
     return tuple(arguments.search_seeds) if effort else (0,)
 
 
@@ -131,13 +140,13 @@ def some(rows: list[Row], **wanted: Any) -> list[Row]:
     return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
 
 
-def means(rows: list[Row], figure: str) -> list[list[float]]:
-    """Over the songs of a set: of each training, of each draw."""
+def means(rows: list[Row], metric: str) -> list[list[float]]:
+    """Means over the songs of a set: one for each training and seed."""
     trainings: dict[str, dict[int, list[float]]] = {}
     for row in rows:
-        draws = trainings.setdefault(row["weights"], {})
-        draws.setdefault(row["seed"], []).append(row[figure])
-    return [[statistics.mean(songs) for songs in draws.values()] for draws in trainings.values()]
+        seeds = trainings.setdefault(row["weights"], {})
+        seeds.setdefault(row["seed"], []).append(row[metric])
+    return [[statistics.mean(songs) for songs in seeds.values()] for seeds in trainings.values()]
 
 
 def overall(trainings: list[list[float]]) -> float:
@@ -146,7 +155,7 @@ def overall(trainings: list[list[float]]) -> float:
 
 
 def spread(trainings: list[list[float]]) -> str:
-    """Mean, and standard deviations of draws and of trainings, where there are several."""
+    """Mean, and standard deviations over seeds and over trainings, where there are several."""
     text = f"{overall(trainings):.3f}"
     if len(trainings[0]) > 1:
         text += f" ± {statistics.mean(map(statistics.stdev, trainings)):.3f}"
@@ -158,14 +167,14 @@ def spread(trainings: list[list[float]]) -> str:
 def comparison(rows: list[Row], players: list[tuple[str, int]]) -> str:
     """The main table."""
     lines = [
-        "| player | set | trainings x draws | precision | recall | F1 | the paper's P / R / F1 "
+        "| player | set | trainings x seeds | precision | recall | F1 | the paper's P / R / F1 "
         "| real time |",
         "| --- | --- | --- | ---: | ---: | ---: | --- | ---: |",
     ]
     for method, effort in players:
         for songs in SETS:
             mine = some(rows, method=method, effort=effort, set=songs)
-            cells = [spread(means(mine, figure)) for figure in FIGURES]
+            cells = [spread(means(mine, metric)) for metric in METRICS]
             theirs = " / ".join(f"{value:.2f}" for value in PAPER.get(method, {}).get(songs, ()))
             trainings = means(mine, "f1")
             count = f"{len(trainings)} x {len(trainings[0])}"
@@ -179,7 +188,7 @@ def comparison(rows: list[Row], players: list[tuple[str, int]]) -> str:
 def papers_table(rows: list[Row], songs: str, players: list[tuple[str, int]]) -> str:
     """Table 9 or 10: precision, recall and F1 of each song, ours and the paper's.
 
-    Songs that have other names there, for nobody knows which is which, are rows of their own.
+    Songs with other names in the paper, of which it is unknown which is which, have their own rows.
     """
     mine = [player for player in players if player[0] in PAPER_PLAYERS]
     names = sorted({row["song"] for row in rows if row["set"] == songs})
@@ -190,10 +199,10 @@ def papers_table(rows: list[Row], songs: str, players: list[tuple[str, int]]) ->
     for name in [*names, *(other for other in theirs if other not in names)]:
         cells = [name]
         for method, effort in mine:
-            playings = some(rows, method=method, effort=effort, song=name)
+            played = some(rows, method=method, effort=effort, song=name)
             cells += [
-                f"{statistics.mean(row[figure] for row in playings):.2f}" if playings else ""
-                for figure in FIGURES
+                f"{statistics.mean(row[metric] for row in played):.2f}" if played else ""
+                for metric in METRICS
             ]
         lines.append(f"| {' | '.join([*cells, *theirs.get(name, ' ' * 5).split(' ')])} |")
     return "\n".join(lines)
@@ -245,17 +254,30 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     options.add_argument("-o", "--output", type=Path, default=common.ROOT / "out" / "tables")
-    options.add_argument("--weights", type=Path, nargs="+", help="folders, one a training")
     options.add_argument(
-        "--headline", default="two-stage-diff", choices=METHODS, help="method of all trainings"
+        "--weights", type=Path, nargs="+", help="folders of weights, one for each training"
     )
-    options.add_argument("--seeds", type=int, nargs="+", default=(0, 1, 2), help="of what is drawn")
     options.add_argument(
-        "--search-seeds", type=int, nargs="+", default=(0, 1, 2), help="of players that search"
+        "--headline",
+        default="two-stage-diff",
+        choices=GENERALISTS,
+        help="method that is played with all of them",
     )
-    options.add_argument("--effort", type=int, default=0, help="of methods that imitate")
-    options.add_argument("--efforts", type=int, nargs="+", default=(0, 1), help="of the others")
-    options.add_argument("--jobs", type=int, default=None, help="songs at the same time")
+    options.add_argument(
+        "--seeds", type=int, nargs="+", default=(0, 1, 2), help="of stochastic policies"
+    )
+    options.add_argument(
+        "--search-seeds",
+        type=int,
+        nargs="+",
+        default=(0, 1, 2),
+        help="of players with predictive sampling",
+    )
+    options.add_argument("--effort", type=int, default=0, help="effort of methods that imitate")
+    options.add_argument(
+        "--efforts", type=int, nargs="+", default=(0, 1), help="efforts of the others"
+    )
+    options.add_argument("--jobs", type=int, default=None, help="songs played at the same time")
     arguments = options.parse_args()
     facts = common.machine()
     common.show_machine(facts)
@@ -268,9 +290,9 @@ def main() -> None:
             raise SystemExit(str(error)) from None
     if first is not None:
         os.environ[WEIGHTS] = str(first)
-    methods = [name for name in (*METHODS, FINGERS) if there(name)]
-    missing = [name for name in (*METHODS, FINGERS) if name not in methods]
-    players = [(method, arguments.effort) for method in methods if method in METHODS]
+    methods = [name for name in (*GENERALISTS, FINGERS) if available(name)]
+    missing = [name for name in (*GENERALISTS, FINGERS) if name not in methods]
+    players = [(method, arguments.effort) for method in methods if method in GENERALISTS]
     ours = ["zero-shot", *(name for name in methods if name == FINGERS)]
     players += [(name, effort) for effort in arguments.efforts for name in ours]
     rows = []
@@ -289,7 +311,7 @@ def main() -> None:
         writer.writerows(rows)
     parts = [comparison(rows, players)]
     if missing:
-        parts.append(f"Not played, for want of weights: {', '.join(missing)}.")
+        parts.append(f"Not played, because their weights are missing: {', '.join(missing)}.")
     for table in (papers_table, by_song):
         parts += [table(rows, songs, players) for songs in SETS]
     tables = "\n\n".join(parts)

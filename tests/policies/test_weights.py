@@ -7,6 +7,7 @@ import pytest
 
 from pianomime import Score, excerpt, load_player, songs
 from pianomime.policies.methods import WEIGHTS, weights_folder
+from pianomime.policies.policy import load_network
 
 
 @pytest.fixture(autouse=True)
@@ -26,6 +27,23 @@ def test_they_are_small() -> None:
     assert files
     assert sum(file.stat().st_size for file in files) < 20e6
     assert (weights_folder() / "README.md").is_file()
+
+
+def test_they_tell_what_they_are() -> None:
+    for file in weights_folder().glob("*.onnx"):
+        _, info = load_network(file, file.stem)
+        assert info.licence
+        assert (info.level == "high") == file.stem.startswith("high")
+        assert (info.diffusion is not None) == file.stem.endswith("diff")
+
+
+def test_their_card_begins_with_what_hubs_read() -> None:
+    card = (weights_folder() / "README.md").read_text(encoding="utf-8")
+    _, head, body = card.split("---\n", 2)
+    keys = {line.partition(":")[0] for line in head.splitlines() if not line.startswith((" ", "-"))}
+    assert keys >= {"license", "library_name", "tags", "datasets"}
+    for file in weights_folder().glob("*.onnx"):
+        assert f"`{file.name}`" in body
 
 
 def test_fingers_add_something() -> None:

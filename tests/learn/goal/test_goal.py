@@ -10,10 +10,11 @@ from pianomime.errors import InputError
 from pianomime.learn.goal.autoencoder import GoalEncoder
 from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.goals import Goals, read_goals, transpose
-from pianomime.learn.goal.sdf import KEYBOARD, distance
+from pianomime.learn.goal.sdf import KEYBOARD_LENGTH, distance
 from pianomime.learn.goal.training import load_encoder, train_goal
 from pianomime.learn.imitation.trainer_config import TrainerConfig
 from pianomime.music import Score
+from pianomime.progress import no_progress
 from pianomime.world.parameters import key_centres
 
 KEY_SETS = st.sets(st.integers(0, 87), max_size=8)
@@ -26,16 +27,12 @@ def goal_of(keys):
     return goal
 
 
-def quiet(*_):
-    pass
-
-
 @settings(deadline=None, max_examples=40)
 @given(keys=KEY_SETS, place=PLACES)
 def test_distance_is_that_to_the_nearest_key(keys, place):
     far = [np.linalg.norm(key_centres()[key] - place) for key in keys]
     found = float(distance(goal_of(keys), torch.tensor(place, dtype=torch.float64)))
-    assert found == pytest.approx(min([*far, KEYBOARD]))
+    assert found == pytest.approx(min([*far, KEYBOARD_LENGTH]))
 
 
 @settings(deadline=None, max_examples=40)
@@ -50,7 +47,7 @@ def test_laws_of_distance(keys, more, place, other):
 
 def test_silence_is_far_from_everywhere_and_no_key():
     for key in (0, 40, 87):
-        assert float(distance(goal_of([]), torch.tensor(key_centres()[key]))) == KEYBOARD
+        assert float(distance(goal_of([]), torch.tensor(key_centres()[key]))) == KEYBOARD_LENGTH
     assert float(distance(goal_of([0]), torch.tensor(key_centres()[0]))) == 0.0
 
 
@@ -70,7 +67,7 @@ def test_a_code_does_not_depend_on_what_else_is_coded():
     torch.manual_seed(0)
     goals = (torch.rand(20, 88) < 0.05).float()
     encoder = GoalEncoder()
-    encoder.standardise(goals)
+    encoder.standardize(goals)
     for mode in (True, False):
         encoder.train(mode)
         torch.testing.assert_close(encoder(goals)[3], encoder(goals[3]))
@@ -94,16 +91,16 @@ def folder(tmp_path):
 
 def test_training_measures_on_other_files_and_can_be_read(folder, tmp_path):
     config = GoalConfig(trainer=TrainerConfig(steps=30, batch=16, warmup=2, bfloat16=False))
-    figures, goals = train_goal([folder], tmp_path / "goal", config, quiet, quiet)
-    assert (goals.files, goals.unseen_files, goals.skipped) == (5, 1, 1)
-    assert 0 < figures.error_mm < 1e3 * KEYBOARD
+    metrics, goals = train_goal([folder], tmp_path / "goal", config)
+    assert (goals.files, goals.validation_files, goals.skipped) == (5, 1, 1)
+    assert 0 < metrics.error_mm < 1e3 * KEYBOARD_LENGTH
     keys = torch.from_numpy(goals.train.keys().astype(np.float32))
     codes = load_encoder(tmp_path / "goal")(keys)
     assert not codes.requires_grad
     assert (tmp_path / "goal" / "codes.png").stat().st_size > 1000
     # What is finished is taken as it is.
-    again, _ = train_goal([folder], tmp_path / "goal", config, quiet, quiet)
-    assert again == figures
+    again, _ = train_goal([folder], tmp_path / "goal", config)
+    assert again == metrics
     torch.testing.assert_close(load_encoder(tmp_path / "goal")(keys), codes)
 
 
@@ -115,8 +112,8 @@ def test_it_learns_where_keys_are(folder, tmp_path):
         transpose=0,
         trainer=TrainerConfig(steps=400, batch=32, learning_rate=3e-3, warmup=20, bfloat16=False),
     )
-    before, _ = train_goal([folder], tmp_path / "short", short, quiet, quiet)
-    after, _ = train_goal([folder], tmp_path / "long", config, quiet, quiet)
+    before, _ = train_goal([folder], tmp_path / "short", short)
+    after, _ = train_goal([folder], tmp_path / "long", config)
     assert after.error_mm < 0.5 * before.error_mm
 
 
@@ -124,14 +121,14 @@ def test_too_few_goals_to_measure_on_are_told_at_once(tmp_path):
     for key in range(3):
         Score([40 + key], [0.0], [0.5], [80]).to_midi(tmp_path / f"{key}.mid")
     with pytest.raises(InputError, match="too few"):
-        train_goal([tmp_path], tmp_path / "goal", GoalConfig(), quiet, quiet)
+        train_goal([tmp_path], tmp_path / "goal", GoalConfig())
     assert not (tmp_path / "goal").exists()
 
 
 def test_the_same_seed_learns_the_same(folder, tmp_path):
     def codes(name, seed):
         trainer = TrainerConfig(steps=5, batch=16, warmup=1, seed=seed, bfloat16=False)
-        train_goal([folder], tmp_path / name, GoalConfig(trainer=trainer), quiet, quiet)
+        train_goal([folder], tmp_path / name, GoalConfig(trainer=trainer))
         return load_encoder(tmp_path / name)(torch.eye(88))
 
     one = codes("one", 0)
@@ -140,9 +137,9 @@ def test_the_same_seed_learns_the_same(folder, tmp_path):
 
 
 def test_files_are_on_one_side_only(folder):
-    first, again = (read_goals([folder], 0.3, quiet) for _ in range(2))
+    first, again = (read_goals([folder], 0.3, no_progress) for _ in range(2))
     assert first.train.digest == again.train.digest
-    assert (first.files, first.unseen_files) == (4, 2)
+    assert (first.files, first.validation_files) == (4, 2)
 
 
 @pytest.mark.parametrize("content", [None, b"", b"no weights"])
@@ -158,3 +155,11 @@ def test_goals_are_counted_once():
     roll[1:3, 4] = roll[4:, 4] = True
     goals = Goals.from_roll(roll)
     assert sorted(goals.frames.tolist()) == [2, 4]
+
+
+@pytest.mark.parametrize(
+    "settings", [{"queries": 0}, {"octaves": 13}, {"transpose": 88}, {"validation_share": 0.95}]
+)
+def test_settings_out_of_range_are_refused(settings):
+    with pytest.raises(InputError, match="must be"):
+        GoalConfig(**settings)

@@ -200,7 +200,7 @@ def test_it_learns_a_clip_by_heart(clips, name, steps):
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
-    action = torch_policy(network).say(
+    action = torch_policy(network).act(
         {key: sample[key] for key in INPUTS}, np.random.default_rng(0)
     )
     level, residual = network.config.level, network.config.residual
@@ -284,7 +284,7 @@ def test_another_policy_under_its_name_is_refused(clips, tmp_path, monkeypatch):
     network, _ = a_network(clips, "low-diff", tiny=True)
     for name in ("high-diff", "low-diff", "bc-mse", "fingers"):
         export(network, "low-diff", tmp_path / f"{name}.onnx")
-    for player in ("two-network-diff", "bc-mse", "fingers"):
+    for player in ("two-stage-diff", "bc-mse", "fingers"):
         with pytest.raises(InputError, match="holds the policy low-diff"):
             load_player(player)
 

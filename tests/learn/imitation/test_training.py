@@ -9,7 +9,7 @@ import pytest
 from pianomime import cli, load_player
 from pianomime.errors import InputError
 from pianomime.learn.data.episode import COLUMNS, Episode
-from pianomime.learn.data.trajectories import write_expert_data
+from pianomime.learn.data.trajectories import write_trajectories
 from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.training import train_goal
 from pianomime.learn.imitation.config import DiffusionConfig, policy_config
@@ -21,7 +21,7 @@ from pianomime.progress import no_progress
 
 SHORT = TrainerConfig(steps=4, batch=8, warmup=1)
 NO_SDF = policy_config("high-diff-no-sdf")
-TINY = DiffusionConfig(channels=(8, 8, 16), condition=(16,), step_width=8)
+TINY = DiffusionConfig(channels=(8, 8, 16), condition_layers=(16,), step_embedding=8)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def data(two_notes: Demonstration, tmp_path_factory: pytest.TempPathFactory) -> 
     columns["fingertips"] = two_notes.plan.fingertips.astype(np.float32)
     columns["keys"] = columns["goal"].astype(np.float32)
     episodes = (Episode(str(number), 1.0, "ik", columns, number) for number in range(15))
-    write_expert_data(folder / "experts.zarr", episodes)
+    write_trajectories(folder / "experts.zarr", episodes)
     config = GoalConfig(trainer=replace(SHORT, bfloat16=False))
     train_goal([songs], folder / "goal", config)
     return folder
@@ -61,8 +61,8 @@ def train(name, data, out, **changes):
 @pytest.mark.parametrize("low", ["low-diff", "low-diff-res"])
 def test_what_was_trained_plays(data, two_notes, tmp_path, monkeypatch, low):
     """With codes of goals: data, goal encoder, training, export, playing."""
-    for stage in ("high-diff", low):
-        assert train(stage, data, tmp_path) == tmp_path / f"{stage}.onnx"
+    for policy in ("high-diff", low):
+        assert train(policy, data, tmp_path) == tmp_path / f"{policy}.onnx"
     monkeypatch.setenv(WEIGHTS, str(tmp_path))
     player = load_player("two-stage-diff-res" if low.endswith("res") else "two-stage-diff", 0)
     first, again = (player.play(two_notes.score) for _ in range(2))
@@ -80,19 +80,19 @@ def test_what_is_finished_is_taken_as_it_is(data, tmp_path):
         train("high-diff-no-sdf", data, tmp_path, tip_noise=0.5)
 
 
-@pytest.mark.parametrize("stage", ["high-diff-no-sdf", "low-diff"])
-def test_a_stage_that_was_stopped_comes_to_the_same(data, tmp_path, stage):
+@pytest.mark.parametrize("policy", ["high-diff-no-sdf", "low-diff"])
+def test_a_training_that_was_stopped_comes_to_the_same(data, tmp_path, policy):
     config = replace(
-        policy_config(stage), diffusion=TINY, trainer=replace(SHORT, checkpoint_seconds=0.0)
+        policy_config(policy), diffusion=TINY, trainer=replace(SHORT, checkpoint_seconds=0.0)
     )
-    demos, experts = (data / "demos", []) if "high" in stage else (None, [data / "experts.zarr"])
+    demos, experts = (data / "demos", []) if "high" in policy else (None, [data / "experts.zarr"])
 
     def stop(phase, done, total, remark=""):
         if done == 2:
             raise KeyboardInterrupt
 
     def run(folder, progress=no_progress):
-        return train_policy(stage, config, folder, demos, experts, data / "goal", progress)
+        return train_policy(policy, config, folder, demos, experts, data / "goal", progress)
 
     whole = run(tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
@@ -109,8 +109,8 @@ def test_what_another_goal_encoder_trained_is_not_gone_on_with(data, tmp_path):
         train_policy("high-diff", config, tmp_path, data / "demos", [], tmp_path / "goal")
 
 
-def test_a_folder_of_the_name_of_another_stage(data, tmp_path, capsys):
-    """The defaults are those of the stage that is named, wherever it stands."""
+def test_a_folder_of_the_name_of_another_policy(data, tmp_path, capsys):
+    """The defaults are those of the policy that is named, wherever it stands."""
     experts, out = str(data / "experts.zarr"), str(tmp_path / "low-mse")
     short = [
         "--trainer.steps",
@@ -126,8 +126,8 @@ def test_a_folder_of_the_name_of_another_stage(data, tmp_path, capsys):
     assert "bc-mse.onnx" in capsys.readouterr().out
     cli.main(["train", "-o", out, "bc-mse", "--experts", experts, *short])
     with pytest.raises(SystemExit):
-        cli.main(["train", "--diffusion.no-guess", "bc-mse", "--experts", experts])
-    assert "name the stage first" in capsys.readouterr().err
+        cli.main(["train", "--diffusion.no-skip", "bc-mse", "--experts", experts])
+    assert "name the policy first" in capsys.readouterr().err
 
 
 def test_what_is_missing_is_named(data, tmp_path):
@@ -136,9 +136,9 @@ def test_what_is_missing_is_named(data, tmp_path):
         train_policy("high-diff", config, tmp_path, None, [], None)
     with pytest.raises(InputError, match="--experts"):
         train_policy("low-diff", policy_config("low-diff"), tmp_path, None, [], None)
-    for stage, experts in (("low-diff", []), ("high-diff", [data / "experts.zarr"])):
+    for policy, experts in (("low-diff", []), ("high-diff", [data / "experts.zarr"])):
         with pytest.raises(InputError, match="for high levels"):
-            train_policy(stage, policy_config(stage), tmp_path, data / "demos", experts, None)
+            train_policy(policy, policy_config(policy), tmp_path, data / "demos", experts, None)
     with pytest.raises(InputError, match="does not exist"):
         train_policy("high-diff", config, tmp_path, data / "demos", [], tmp_path / "none")
     (tmp_path / "alone").mkdir()
@@ -150,12 +150,12 @@ def test_what_is_missing_is_named(data, tmp_path):
         train_policy("high-diff", config, tmp_path, tmp_path / "empty", [], None)
 
 
-def test_experts_of_another_prior_are_refused(data, tmp_path):
+def test_experts_with_another_base_controller_are_refused(data, tmp_path):
     columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
     episodes = (Episode(f"{number}", 0.0, "dynamic", columns, number) for number in range(3))
-    write_expert_data(tmp_path / "other.zarr", episodes)
+    write_trajectories(tmp_path / "other.zarr", episodes)
     config = replace(policy_config("low-diff-res"), diffusion=TINY, trainer=SHORT)
-    with pytest.raises(InputError, match="prior dynamic"):
+    with pytest.raises(InputError, match="base controller dynamic"):
         train_policy(
             "low-diff-res", config, tmp_path, None, [tmp_path / "other.zarr"], data / "goal"
         )
@@ -164,7 +164,7 @@ def test_experts_of_another_prior_are_refused(data, tmp_path):
 def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):
     columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
     columns["joints"][2] = np.nan
-    write_expert_data(tmp_path / "odd.zarr", iter([Episode("odd", 0.0, "ik", columns)]))
+    write_trajectories(tmp_path / "odd.zarr", iter([Episode("odd", 0.0, "ik", columns)]))
     with pytest.raises(InputError, match="joints of odd"):
         train_policy(
             "bc-mse", policy_config("bc-mse"), tmp_path, None, [tmp_path / "odd.zarr"], None
