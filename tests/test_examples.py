@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,14 +17,13 @@ PRINTS = {
     "my_planner.py": "high-fingers F1",
     "play_a_song.py": "onset_f1",
     "reward_term.py": "reward/stillness",
-    "train_and_plot_an_expert.py": "F1",
 }
 LEAVES = {
     "compare_players.py": "out/compare/zero-shot/results.json",
     "play_a_song.py": "performance.npz",
-    "train_and_plot_an_expert.py": "out/expert.png",
 }
 PLUGIN = "my_player_plugin.py"
+EXPERT = "train_and_plot_an_expert.py"
 
 
 def run(command: list[str], folder: Path) -> str:
@@ -41,7 +41,7 @@ def run(command: list[str], folder: Path) -> str:
 
 
 def test_every_example_is_tested_and_short() -> None:
-    assert {file.name for file in EXAMPLES.glob("*.py")} == {*PRINTS, PLUGIN}
+    assert {file.name for file in EXAMPLES.glob("*.py")} == {*PRINTS, PLUGIN, EXPERT}
     for file in EXAMPLES.glob("*.py"):
         assert len(file.read_text(encoding="utf-8").splitlines()) <= 60
 
@@ -51,6 +51,15 @@ def test_the_example_runs(name: str, tmp_path: Path) -> None:
     assert PRINTS[name] in run([sys.executable, str(EXAMPLES / name)], tmp_path)
     if name in LEAVES:
         assert (tmp_path / LEAVES[name]).exists()
+
+
+def test_an_expert_is_trained_into_a_folder_as_the_reference_has_it(tmp_path: Path) -> None:
+    assert "F1" in run([sys.executable, str(EXAMPLES / EXPERT)], tmp_path)
+    assert (tmp_path / "out" / "expert.png").exists()
+    page = EXAMPLES.parent / "docs" / "reference" / "file-formats.md"
+    text = page.read_text(encoding="utf-8").split("## The folder of a run\n")[1].split("\n## ")[0]
+    shown = re.findall(r"^\| `([^`]+)`", text, flags=re.MULTILINE)
+    assert sorted(name.strip("/") for name in shown) == sorted(os.listdir(tmp_path / "out/expert"))
 
 
 def test_a_player_of_ones_own_takes_25_lines_to_a_row_of_evaluate(tmp_path: Path) -> None:
