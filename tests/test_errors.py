@@ -12,7 +12,7 @@ from pianomime.errors import InputError, closest, unknown_name
     [
         ("zeroshot", "; did you mean 'zero-shot'?"),
         ("ZERO-SHOT", "; did you mean 'zero-shot'?"),
-        ("two-stage", "; did you mean 'two-stage-bet' or 'two-stage-diff'?"),
+        ("two-stage", "; did you mean 'two-stage-diff' or 'two-stage-bet'?"),
         ("xylophone", ""),
     ],
 )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from itertools import combinations
 
 _MOST_NAMES = 3
 """Names that a message suggests at most."""
-_SHORTEST_WORD = 4
-"""Shorter words of a name are like too many others."""
+_SHORTEST_PART = 4
+"""Letters of the shortest part of a name that is compared: shorter ones are like many others."""
 
 
 class InputError(ValueError):
@@ -55,13 +56,17 @@ def closest(name: str, known: Iterable[str]) -> str:
 
     Returns:
         "; did you mean 'X'?", with at most three names, the most alike first, or "" if none is
-        alike. A name is alike if one of its words is; upper and lower case count as equal.
+        alike. A name is alike if some words of it are, such as "fur-elise" of
+        "beethoven-fur-elise"; upper and lower case count as equal.
     """
-    by_word: dict[str, list[str]] = {}
+    by_part: dict[str, list[str]] = {}
     for each in known:
-        words = [word for word in each.lower().split("-") if len(word) >= _SHORTEST_WORD]
-        for word in dict.fromkeys([each.lower(), *words]):
-            by_word.setdefault(word, []).append(each)
-    alike = get_close_matches(name.lower(), by_word, n=_MOST_NAMES)
-    names = list(dict.fromkeys(each for word in alike for each in by_word[word]))[:_MOST_NAMES]
+        words = each.lower().split("-")
+        runs = combinations(range(len(words) + 1), 2)
+        parts = ["-".join(words[first:end]) for first, end in runs]
+        for part in dict.fromkeys([each.lower(), *parts]):
+            if part == each.lower() or len(part) >= _SHORTEST_PART:
+                by_part.setdefault(part, []).append(each)
+    alike = get_close_matches(name.lower(), by_part, n=_MOST_NAMES)
+    names = list(dict.fromkeys(each for part in alike for each in by_part[part]))[:_MOST_NAMES]
     return f"; did you mean {' or '.join(map(repr, names))}?" if names else ""

@@ -80,6 +80,8 @@ def test_a_part_of_the_name_will_do(name: str, song: str) -> None:
     [
         ("twinkel", "twinkel: no such file or bundled song; did you mean 'twinkle-twinkle'?"),
         ("my/gymnopedi.mid", "did you mean 'satie-gymnopedie-1'?"),
+        ("fur-elize", "did you mean 'beethoven-fur-elise'?"),
+        ("oed to joy", "did you mean 'beethoven-ode-to-joy'?"),
         ("e", "e: is part of more than one bundled song: bach"),
         (" ", "the name of a song is empty"),
         ("zzz", "zzz: no such file or bundled song; bundled are: bach"),

@@ -23,8 +23,8 @@ HANDS = {side: Hand(side) for side in SIDES}
 REST = np.zeros(JOINTS)
 
 
-def wishes(frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """No wishes: targets (T, 6, 3), weights (T, 6, 3), clearance (T, 5)."""
+def no_targets(frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Nothing wanted: targets (T, 6, 3), weights (T, 6, 3), clearance (T, 5)."""
     return np.zeros((frames, 6, 3)), np.zeros((frames, 6, 3)), np.full((frames, 5), np.nan)
 
 
@@ -42,7 +42,7 @@ def test_home_is_within_the_limits(side: str) -> None:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_begins_where_it_is_told(side: str) -> None:
-    path = smooth_path(HANDS[side], REST, *wishes(10))
+    path = smooth_path(HANDS[side], REST, *no_targets(10))
     assert path.shape == (11, JOINTS)
     np.testing.assert_array_equal(path[0], REST)
 
@@ -63,7 +63,7 @@ def test_stays_within_the_limits_whatever_is_wished(side: str, seed: int, frames
 
 @pytest.mark.parametrize("side", SIDES)
 def test_a_single_frame(side: str) -> None:
-    path = smooth_path(HANDS[side], REST, *wishes(1))
+    path = smooth_path(HANDS[side], REST, *no_targets(1))
     assert path.shape == (2, JOINTS)
     assert np.isfinite(path).all()
 
@@ -72,7 +72,7 @@ def test_a_single_frame(side: str) -> None:
 def test_hits_targets_on_time(side: str) -> None:
     """A fingertip is led to a point 10 cm away, and back: both are met within a millimetre."""
     hand = HANDS[side]
-    targets, weights, clearance = wishes(60)
+    targets, weights, clearance = no_targets(60)
     at_home = hand.points(HOME)
     for frame, shift in ((25, 0.1), (26, 0.1), (50, 0.0), (51, 0.0)):
         targets[frame, 2] = at_home[2] + [0.0, shift, -0.01]
@@ -87,7 +87,7 @@ def test_hits_targets_on_time(side: str) -> None:
 def test_moves_smoothly(side: str) -> None:
     """A leap is begun before it is due: no frame asks for more than the hands can do."""
     hand = HANDS[side]
-    targets, weights, clearance = wishes(60)
+    targets, weights, clearance = no_targets(60)
     along = hand.points(HOME)[1:, 1]
     for frame, shift in ((20, -0.1), (40, 0.1)):
         targets[frame, 1:, 1] = along + shift
@@ -103,7 +103,7 @@ def test_moves_smoothly(side: str) -> None:
 @pytest.mark.parametrize("clear", [0.005, 0.01])
 def test_idle_fingertips_keep_clear_of_the_keys(side: str, clear: float) -> None:
     hand = HANDS[side]
-    targets, weights, clearance = wishes(30)
+    targets, weights, clearance = no_targets(30)
     clearance[:] = clear
     # One finger plays; without the clearance the others would come down with the hand.
     clearance[15:20, 2] = np.nan
@@ -119,9 +119,9 @@ def test_idle_fingertips_keep_clear_of_the_keys(side: str, clear: float) -> None
 
 
 def test_hands_are_mirror_images() -> None:
-    """Law: mirrored wishes give the mirrored path."""
+    """Law: mirrored targets give the mirrored path."""
     draw = np.random.default_rng(5)
-    targets, weights, clearance = wishes(20)
+    targets, weights, clearance = no_targets(20)
     targets[:] = HANDS["rh"].points(HOME) + draw.normal(scale=0.01, size=(20, 6, 3))
     weights[::4, 1:] = 1 / 0.002
     clearance[:, 0] = 0.01

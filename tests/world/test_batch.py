@@ -91,7 +91,7 @@ def test_each_can_be_reset_to_a_pose_of_its_own() -> None:
 
 
 def test_worlds_go_to_a_moment_of_a_song(controls: NDArray[np.float64]) -> None:
-    """Several ways to go on from the same moment, as World goes on from it."""
+    """Several ways to go on from the same state, as World goes on from it."""
     leader = World()
     for ctrl in controls[:40, 0]:
         leader.step(ctrl)
@@ -131,9 +131,9 @@ def test_broken_physics_in_one_world_is_its_own(controls: NDArray[np.float64]) -
             batch.set_state(states)
             for world, state in zip(worlds, states, strict=True):
                 world.set_state(state)
-            with pytest.warns(PhysicsWarning, match=r"\(worlds 1\)") as told:
+            with pytest.warns(PhysicsWarning, match=r"\(worlds 1\)") as warned:
                 batch.step(ctrl)
-            assert len(told) == 1
+            assert len(warned) == 1
             with pytest.warns(PhysicsWarning):
                 worlds[1].step(ctrl[1])
             worlds[0].step(ctrl[0])

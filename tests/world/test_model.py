@@ -146,9 +146,9 @@ def model_of_facts(hand: dict[str, Any]) -> mujoco.MjModel:
     spec.compiler.degree = False
     bodies = {None: spec.worldbody}
     for body in hand["bodies"]:
-        figures = {name: body[name] for name in ("name", "pos", "quat", "mass", "ipos", "iquat")}
+        shape = {name: body[name] for name in ("name", "pos", "quat", "mass", "ipos", "iquat")}
         made = bodies[body["parent"]].add_body(
-            **figures, inertia=body["inertia"], explicitinertial=True
+            **shape, inertia=body["inertia"], explicitinertial=True
         )
         bodies[body["name"]] = made
         for joint in body["joints"]:

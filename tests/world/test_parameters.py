@@ -1,4 +1,4 @@
-"""The keyboard's figures, against those that were checked for the paper's world."""
+"""Parameters of the keyboard, against those that were checked for the paper's world."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def test_keys_go_down_a_centimetre_or_so() -> None:
     np.testing.assert_allclose(key_travel()[BLACK], np.arctan(0.008 / 0.09), atol=1e-6)
 
 
-@pytest.mark.parametrize("figures", [key_centres, key_half_sizes, key_travel])
-def test_nobody_can_change_them(figures: Callable[[], NDArray[np.float64]]) -> None:
+@pytest.mark.parametrize("parameters", [key_centres, key_half_sizes, key_travel])
+def test_nobody_can_change_them(parameters: Callable[[], NDArray[np.float64]]) -> None:
     with pytest.raises(ValueError, match="read-only"):
-        figures()[0] = 1.0
+        parameters()[0] = 1.0
 
 
 def test_every_key_is_the_papers(shared: Path) -> None:

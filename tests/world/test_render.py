@@ -54,8 +54,8 @@ def test_dressing_leaves_the_physics_alone() -> None:
     one, other = plain.compile(), dressed.compile()
     for size in ("nq", "nv", "nu", "njnt", "nbody", "ntendon"):
         assert getattr(one, size) == getattr(other, size), size
-    for figure in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_damping"):
-        np.testing.assert_array_equal(getattr(one, figure), getattr(other, figure), figure)
+    for name in ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_damping"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
     skins = other.ngeom - one.ngeom
     touching = (other.geom_contype != 0) | (other.geom_conaffinity != 0)
     assert skins > 0

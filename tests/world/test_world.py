@@ -243,9 +243,9 @@ def test_broken_physics_is_counted_and_told(song_controls: NDArray[np.float64]) 
     run(world, song_controls[:40])
     break_physics(world)
     before = world.qpos
-    with pytest.warns(PhysicsWarning, match="physics broke") as told:
+    with pytest.warns(PhysicsWarning, match="physics broke") as warned:
         world.step(song_controls[40])
-    assert len(told) == 1
+    assert len(warned) == 1
     assert world.blow_ups == 1
     along = [LAYOUT.joints[1].start, LAYOUT.joints[0].start]
     np.testing.assert_array_equal(world.qpos[along], before[along])
