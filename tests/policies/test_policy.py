@@ -57,10 +57,13 @@ def changed(**fields: Any) -> Any:
         (changed(diffusion=None), "tells of its diffusion"),
         (changed(network="mlp"), "tells of its diffusion"),
         (changed(action_size=3), "normalizer of 2 numbers"),
-        (changed(diffusion=[1]), "missing or unknown"),
+        (changed(diffusion=[1]), "diffusion must be an object"),
         (lambda content: content["diffusion"].update(steps=1), "diffusion.steps must be"),
         (lambda content: content["diffusion"].update(prediction="v"), "prediction must be"),
-        (lambda content: content["diffusion"].update(normalizer=None), "missing or unknown"),
+        (
+            lambda content: content["diffusion"].update(normalizer=None),
+            "normalizer must be an object",
+        ),
         (
             lambda content: content["diffusion"]["normalizer"].update(unit=[1.0]),
             "normalizer.unit must be 2",

@@ -17,10 +17,10 @@ from pianomime.learn.imitation.config import POLICIES, PolicyConfig, PolicyName,
 class Train:
     """Train one policy of a generalist, a player that plays every song, by imitation.
 
-    Two-stage players need two policies, a high-level one (goals to fingertips) and a low-level one
-    (fingertips to controls). Policies with goal codes need a goal encoder first (`pianomime
-    train-goal`). OUT then holds POLICY.onnx, and the folder POLICY the training, with its curves
-    for TensorBoard. The same command again resumes a training that was stopped. Set
+    Two-stage players need a high-level policy, from goals to fingertips, and a low-level one, from
+    fingertips to controls. Policies with goal codes need a goal encoder first, see `pianomime
+    train-goal`. OUT then holds POLICY.onnx, and the folder POLICY the training, with its curves for
+    TensorBoard. The same command again resumes a training that was stopped. Set
     PIANOMIME_WEIGHTS=OUT to play with the policies in OUT.
 
     Examples:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
@@ -159,9 +159,9 @@ class PolicyInfo:
             raise InputError(f"a policy of version {version}; this program reads {VERSION}")
         diffusion = content.pop("diffusion", None)
         if diffusion is not None:
-            _check_fields(DiffusionInfo, diffusion, "diffusion.")
+            _check_fields(DiffusionInfo, diffusion, "diffusion")
             normalizer = diffusion["normalizer"]
-            _check_fields(AsinhNormalizer, normalizer, "normalizer.")
+            _check_fields(AsinhNormalizer, normalizer, "normalizer")
             diffusion = DiffusionInfo(**diffusion | {"normalizer": AsinhNormalizer(**normalizer)})
         content["diffusion"] = diffusion
         _check_fields(cls, content)
@@ -307,9 +307,11 @@ def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
         raise InputError(f"{name} must be one of {', '.join(choices)}, not {value!r}")
 
 
-def _check_fields(kind: type[Any], content: Mapping[str, Any], prefix: str = "") -> None:
-    """Refuse metadata that lack a field or have one too many."""
+def _check_fields(kind: type[Any], content: object, part: str = "") -> None:
+    """Refuse metadata that are not an object with exactly the fields of a class."""
     known = {field.name for field in fields(kind)}
-    if not isinstance(content, dict) or set(content) != known:
-        odd = ", ".join(sorted(prefix + name for name in known ^ {*content}))
+    if not isinstance(content, dict):
+        raise InputError(f"{part} must be an object, not {content!r}")
+    if set(content) != known:
+        odd = ", ".join(sorted(f"{part}.{name}".lstrip(".") for name in known ^ set(content)))
         raise InputError(f"metadata with fields missing or unknown: {odd}")
