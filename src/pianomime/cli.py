@@ -20,7 +20,7 @@ import warnings
 from typing import Any, NamedTuple, NoReturn, Protocol
 
 from pianomime import __version__
-from pianomime.errors import InputError, WorkFailed
+from pianomime.errors import InputError, WorkFailed, unknown_name
 
 
 class Runnable(Protocol):
@@ -154,7 +154,7 @@ def _run(arguments: list[str]) -> None:
     elif name == "--version":
         print(f"pianomime {__version__}")
     elif name not in COMMANDS:
-        raise InputError(f"there is no command {name!r}; there are: {', '.join(COMMANDS)}")
+        raise unknown_name("command", name, COMMANDS)
     else:
         _parse(name, rest).run()
 
