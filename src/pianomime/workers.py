@@ -1,6 +1,6 @@
 """Worker processes: requests go in as lines of JSON, and rows come out as lines of JSON.
 
-What is to be done is told as "package.module:function". The function is called once in the new
+The work is named as "package.module:function". The function is called once in the new
 process with a setup, and returns what answers requests: that is where a player or a network is
 loaded. An exception costs one request, and so does a crash, after which the process is started
 again. It ends when its input does, also in the middle of work, and so does not outlive the process
@@ -199,7 +199,7 @@ def _loaded(function: str, setup: Any) -> Answer:
     try:
         answer: Answer = getattr(importlib.import_module(module), name)(setup)
     except Exception as error:
-        failed = error  # Each request is told why.
+        failed = error  # Each request is answered with the reason.
 
         def refuse(request: Any) -> Row:
             raise failed

@@ -63,7 +63,7 @@ def evaluate(
         jobs: processes; one a core that this one may use if None. They share the cores, so
             `realtime_factor` and the times depend on it.
         out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
-        progress: told the songs done, the songs in all and their mean F1 so far.
+        progress: called with the songs done, the songs in all and their mean F1 so far.
 
     Returns:
         What `results.json` holds: `player`, `effort`, `seed`, `settings` and `seconds` as asked for

@@ -51,7 +51,7 @@ class Player(ABC):
 
         Args:
             score: what to play; all of it is played (see `pianomime.excerpt`).
-            progress: told the phases "planning" and "playing".
+            progress: called with the phases "planning" and "playing".
 
         Returns:
             What happened. Its `plan_seconds` is the time that `start` took; a player that plans

@@ -35,7 +35,7 @@ def train_expert(
         seconds: its length at most [s].
         threads: of the physics and of PPO's networks; 0 for one on each core. PPO's curves are
             the same only with the same number.
-        progress: told the control steps spent and those in all.
+        progress: called with the control steps spent and those in all.
 
     Returns:
         The run, with its best expert.

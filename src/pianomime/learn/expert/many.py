@@ -42,7 +42,7 @@ def train_experts(
         seconds: its length at most [s].
         jobs: songs trained at the same time on this machine; one for each core if None.
         ray: address of a Ray cluster whose nodes all see both folders; "local" starts one here.
-        progress: told the songs done, the songs in all and their mean F1 so far.
+        progress: called with the songs done, the songs in all and their mean F1 so far.
 
     Returns:
         A row for each song, in the order of their names.

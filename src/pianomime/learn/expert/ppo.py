@@ -36,7 +36,7 @@ def train_ppo(run: ExpertRun, threads: int, progress: Progress) -> None:
     Args:
         run: its folder.
         threads: of the physics and of the networks; 0 for one on each core.
-        progress: told the control steps spent and those in all.
+        progress: called with the control steps spent and those in all.
 
     Raises:
         InputError: the checkpoint is damaged.

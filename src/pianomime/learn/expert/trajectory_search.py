@@ -38,7 +38,7 @@ def search_trajectory(run: ExpertRun, threads: int, progress: Progress) -> None:
         run: its folder.
         threads: how many variations step at the same time; 0 for one on each core. It changes
             nothing but the time that it takes.
-        progress: told the control steps spent and those in all.
+        progress: called with the control steps spent and those in all.
 
     Raises:
         InputError: the checkpoint is damaged.

@@ -55,7 +55,7 @@ def train_fingers(
         out: folder; `fingers.onnx` is the result, and `fingers` holds the training.
         config: how to train it.
         threads: of the physics and of the network; 0 for one on each core.
-        progress: told the songs that are planned, then the frames that were played.
+        progress: called with the songs that are planned, then the frames that were played.
 
     Returns:
         The ONNX file, and the mean F1 on the validation songs: `validation/f1` with the residual

@@ -86,7 +86,7 @@ def read_goals(folders: Sequence[Path], validation_share: float, progress: Progr
     Args:
         folders: of MIDI files, also further down.
         validation_share: share of the files that is kept for validation; one file at least.
-        progress: told the files that are read.
+        progress: called with the files that are read.
 
     Raises:
         InputError: a folder has none, or fewer than two files can be read, or there are too few

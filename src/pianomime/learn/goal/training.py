@@ -59,7 +59,7 @@ def train_goal(
         folders: of MIDI files.
         out: folder of the training and its result.
         config: how to train it.
-        progress: told the files that are read, then the updates that were done.
+        progress: called with the files that are read, then the updates that were done.
 
     Returns:
         The metrics on the validation goals, and all goals.

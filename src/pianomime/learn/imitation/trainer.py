@@ -76,7 +76,7 @@ def train_network(
         sample_batch: what is learned from.
         config: how to train.
         evaluate: measures the averaged weights; its metrics go to TensorBoard.
-        progress: told the updates that were done.
+        progress: called with the updates that were done.
         depends_on: what else the weights depend on, such as the network's settings and the data;
             for JSON. A run is resumed only where it is the same.
         held_out: samples that are not learned from, whose loss is measured as well.

@@ -53,7 +53,7 @@ def train_policy(
         demonstrations: what high levels learn from, see `demonstration_dataset`; `experts` if None.
         experts: data sets that all others learn from, see `trajectory_dataset`.
         goal: folder of the goal encoder, where goals are encoded.
-        progress: told the updates that were done.
+        progress: called with the updates that were done.
 
     Returns:
         The ONNX file.

@@ -150,7 +150,7 @@ def train_sac(
         out: folder; `multi-task-sac.onnx` is the result, `multi-task-sac` holds the training.
         config: how to train it.
         threads: of the physics; 0 for one on each core.
-        progress: told the frames that were played.
+        progress: called with the frames that were played.
 
     Raises:
         InputError: a song cannot be used, or the folder holds another training.
