@@ -87,7 +87,7 @@ ALIASES = {"teach": "collect-dagger", "explain": "diagnose"}
 
 
 def _help() -> str:
-    listed = "\n".join(f"  {name:<14} {command.summary}" for name, command in COMMANDS.items())
+    listed = "\n".join(f"  {name:<15} {command.summary}" for name, command in COMMANDS.items())
     return (
         "usage: pianomime COMMAND ...\n\n"
         "Give it a song, and two simulated robot hands play it.\n\n"

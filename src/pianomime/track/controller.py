@@ -24,8 +24,8 @@ class Controller(Protocol):
         ...
 
     @property
-    def plan(self) -> FingertipPlan:
-        """What is to be played, a row for each frame.
+    def plan(self) -> FingertipPlan | None:
+        """What is to be played, a row for each frame; None where nothing is planned.
 
         A controller that plans while it plays knows the frames that it was asked for; the rest are
         at rest.

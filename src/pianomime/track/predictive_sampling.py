@@ -93,7 +93,7 @@ class PredictiveSamplingTracker:
         """A controller; for the same plan it draws the same variations.
 
         Raises:
-            InputError: the other tracker's controller is not replayable.
+            InputError: the other tracker's controller is not replayable, or has no plan.
         """
         goal = plan.keys() if self._goal is None else self._goal
         return PredictiveSamplingController(
@@ -116,7 +116,7 @@ class PredictiveSamplingController:
         threads: how many variations step at the same time; 0 for one on each core.
 
     Raises:
-        InputError: `base` is not replayable.
+        InputError: `base` is not replayable, or has no plan.
     """
 
     replayable = False
@@ -133,6 +133,8 @@ class PredictiveSamplingController:
                 f"predictive sampling needs a replayable controller, which {type(base).__name__} "
                 "is not: it cannot be asked ahead on copies of the world"
             )
+        if base.plan is None:
+            raise InputError("predictive sampling needs a plan, to know which fingers to vary")
         self.config = config
         self.plan = base.plan
         self.steps = 0

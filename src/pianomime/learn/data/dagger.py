@@ -31,6 +31,7 @@ from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.policy import load_policy
 from pianomime.policies.sampler import Sampler
 from pianomime.track import Controller, DynamicTracker, IkTracker
+from pianomime.track.dynamic import DynamicController
 from pianomime.workers import Answer, Row, cores, work
 from pianomime.world import World
 from pianomime.world.hand import by_actuator
@@ -105,7 +106,7 @@ class _DaggerController:
 
     def __init__(
         self,
-        expert: Controller,
+        expert: DynamicController,
         policy: Controller | None,
         spread: NDArray[np.float64],
         correlation: float,
