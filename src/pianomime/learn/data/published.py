@@ -50,7 +50,7 @@ _ODD = "odd"
 
 
 def read_published(source: Path, limit: int | None = None) -> Iterator[tuple[Demonstration, int]]:
-    """Demonstrations of a data set, one after the other, and number of clips.
+    """Demonstrations of a data set, each with the number of all.
 
     Args:
         source: a folder with a zarr data set, or an .npz file.
@@ -329,13 +329,13 @@ def _zarr(folder: Path) -> list[_Clip]:
         raise InputError(
             f"{folder}: reading it needs the package zarr: pip install -e '.[video]'"
         ) from error
-    wanted = f"{folder}: not PianoMime's high-level data set"
+    refusal = f"{folder}: not PianoMime's high-level data set"
     try:
         root = zarr.open_group(str(folder), mode="r")
         group, meta = (root.get(name, root) for name in ("data", "meta"))
         widths = tuple(group[name].shape[1] for name in ("state", "action"))
         if widths != _WIDTHS:
-            raise InputError(f"{wanted}: state and action have {widths} columns, not {_WIDTHS}")
+            raise InputError(f"{refusal}: state and action have {widths} columns, not {_WIDTHS}")
         # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers; what follows are
         # those of the frames to come.
         action = np.asarray(group["action"][:, : POINTS_SIZE + 2 * FINGER_COUNT])
@@ -344,9 +344,9 @@ def _zarr(folder: Path) -> list[_Clip]:
         raise
     # A damaged store raises what its codecs and its metadata happen to raise.
     except (LookupError, ValueError, OSError, TypeError, AttributeError, RuntimeError) as error:
-        raise InputError(f"{wanted} ({error})") from error
+        raise InputError(f"{refusal} ({error})") from error
     if not len(ends) or (np.diff(ends, prepend=-1) <= 0).any() or ends[-1] != len(action) - 1:
-        raise InputError(f"{wanted}: its clips do not end where its {len(action)} rows do")
+        raise InputError(f"{refusal}: its clips do not end where its {len(action)} rows do")
     clips: list[_Clip] = []
     first = 0
     for end in ends:

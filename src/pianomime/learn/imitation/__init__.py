@@ -1,1 +1,1 @@
-"""How players of every song learn from data (paper, appendices E to G)."""
+"""Imitation learning: networks, training loop and export of policies (paper, appendices E to G)."""
