@@ -8,7 +8,10 @@ the F1 alone.
 
     python benchmarks/digest.py              # compare; exit code 1 where something differs
     python benchmarks/digest.py --f1         # the F1 alone, within 0.003
-    python benchmarks/digest.py --write      # make digest.json anew
+    python benchmarks/digest.py --write      # make digest.json anew, and what tests compare with
+
+Tests compare with the F1 of the zero-shot player in tests/quality/f1.json, and with the plans and
+controls of stored_plans.py.
 """
 
 from __future__ import annotations
@@ -26,14 +29,18 @@ from typing import NamedTuple
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pianomime
-from common import cores, parser
+from common import ROOT, cores, parser
 from pianomime import load_player, songs
 from pianomime.files import atomic
+from stored_plans import write_plans
 
 STORED = Path(__file__).with_name("digest.json")
-PLAYERS = ("zero-shot", "zero-shot-ik", "fingers", "two-stage-diff", "two-stage-mse")
+F1_TABLE = ROOT / "tests" / "quality" / "f1.json"
+ZERO_SHOT = "zero-shot"
+PLAYERS = (ZERO_SHOT, "zero-shot-ik", "fingers", "two-stage-diff", "two-stage-mse")
 DEMONSTRATION_PLAYERS = ("demonstration", "demonstration-ik")
 REFERENCE = ("etude12", "modern/test12")
+Stored = dict[str, dict[str, str | float]]
 TOLERANCE = 0.003
 """Of the F1, for machines on which the controls differ in the last bit."""
 
@@ -62,7 +69,7 @@ def jobs(shared: Path | None) -> list[Job]:
             file.stem: str(file) for file in sorted((shared / "data" / folder).glob("*.mid"))[:3]
         }
     made = [Job(player, 0, name, path, 30.0) for player in PLAYERS for name, path in pieces.items()]
-    made += [Job("zero-shot", 1, name, pieces[name], 15.0) for name in bundled[:2]]
+    made += [Job(ZERO_SHOT, 1, name, pieces[name], 15.0) for name in bundled[:2]]
     if shared is not None:
         clip = str(shared / "data" / "stan" / "reference.npz")
         made += [Job(player, 0, "Stan_1", clip, 30.0) for player in DEMONSTRATION_PLAYERS]
@@ -87,6 +94,25 @@ def play(job: Job) -> dict[str, str | float]:
     return {"controls": digest, "f1": round(performance.metrics()["f1"], 6)}
 
 
+def write(found: dict[Job, dict[str, str | float]], stored: Stored, shared: Path | None) -> None:
+    """Make digest.json and f1.json anew; without reference data, what needs it stays as it is."""
+    rows = {job.name: row for job, row in found.items()}
+    table = {}
+    if F1_TABLE.exists():
+        table = {(row["song"], row["effort"]): row for row in json.loads(F1_TABLE.read_text())}
+    for job, row in found.items():
+        if job.player == ZERO_SHOT:
+            song = job.song
+            if song not in songs.names():
+                assert shared is not None
+                song = Path(job.path).relative_to(shared).as_posix()
+            numbers = {"effort": job.effort, "seconds": job.seconds, "f1": row["f1"]}
+            table[song, job.effort] = {"song": song, **numbers}
+    for path, content in ((STORED, {**stored, **rows}), (F1_TABLE, list(table.values()))):
+        with atomic(path) as temporary:
+            temporary.write_text(json.dumps(content, indent=1) + "\n", "utf-8")
+
+
 def main() -> int:
     """Play, then compare or write."""
     arguments = parser("digest", __doc__)
@@ -94,12 +120,13 @@ def main() -> int:
     arguments.add_argument("--f1", action="store_true", help="compare the F1 alone")
     asked = arguments.parse_args()
     folder = os.environ.get("PIANOMIME_SHARED")
-    todo = jobs(Path(folder) if folder and Path(folder).is_dir() else None)
-    stored = json.loads(STORED.read_text("utf-8")) if STORED.exists() else {}
+    shared = Path(folder) if folder and Path(folder).is_dir() else None
+    todo = jobs(shared)
+    stored: Stored = json.loads(STORED.read_text("utf-8")) if STORED.exists() else {}
     found, wrong = {}, 0
     with ProcessPoolExecutor(len(cores()), get_context("spawn")) as pool:
         for job, row in zip(todo, pool.map(play, todo), strict=True):
-            found[job.name] = row
+            found[job] = row
             known = stored.get(job.name)
             if known is None:
                 verdict = "new"
@@ -110,8 +137,8 @@ def main() -> int:
             wrong += verdict.startswith("DIFFERS") or (verdict == "new" and not asked.write)
             print(f"{row['controls']}  {row['f1']:.6f}  {verdict}  {job.name}", flush=True)
     if asked.write:
-        with atomic(STORED) as temporary:
-            temporary.write_text(json.dumps({**stored, **found}, indent=1) + "\n", "utf-8")
+        write(found, stored, shared)
+        write_plans()
         return 0
     print(f"{len(found) - wrong} of {len(found)} as before")
     return int(wrong > 0)

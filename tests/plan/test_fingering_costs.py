@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from any_score import chord, score_of
+from any_score import score_of
 from pianomime.keyboard import BLACK, FRAME_SECONDS, KEYS
 from pianomime.plan import LEFT, RIGHT
 from pianomime.plan.fingering import find_fingering, frame_values
@@ -224,16 +224,11 @@ def test_stretch_is_the_fourth_power_and_strain_the_square_of_the_reach(side: in
 
 
 def test_hands_do_not_come_close_where_it_costs() -> None:
-    """Measured from one relaxed middle finger to the other."""
-    score = chord([45, 47, 49, 50])
-
-    def apart(price: float) -> float:
-        fingering = find_fingering(score, FingeringConfig(crossed=price, weak_finger=2.0))
-        ease = EASE[fingering.finger] * np.where(fingering.hand == RIGHT, 1, -1)
-        middle = ALONG[score.key] - ease
-        return float(middle[fingering.hand == RIGHT].mean() - middle[fingering.hand == LEFT].mean())
-
-    assert apart(0.0) < FingeringConfig().apart <= apart(50.0)
+    """Two keys side by side, in the middle: without the price each hand takes one."""
+    score = score_of((49, 4, 9), (48, 9, 22))
+    assert find_fingering(score, FingeringConfig(crossed=0.0)).hand.tolist() == [RIGHT, LEFT]
+    assert find_fingering(score, FingeringConfig()).hand.tolist() == [RIGHT, RIGHT]
+    assert find_fingering(score, FingeringConfig(apart=0.0)).hand.tolist() == [RIGHT, LEFT]
 
 
 def test_a_note_that_costs_more_than_it_is_worth_is_left_out() -> None:
