@@ -6,6 +6,9 @@ and the effort were chosen on no song of `pop` and `repertoire`; the tracker lon
 Etude-12 and `modern`, among others. A part is taken out by a setting where there is one that
 does it, else by one of the factories below. Songs that were finished are not played again.
 
+A finger that is caught between keys costs a whole song much, and any change may free it. So the
+table has the median over all songs beside the mean, and on how many the part helps and harms.
+
     python benchmarks/ablation.py
 """
 
@@ -247,6 +250,8 @@ def main() -> None:
                 *(f"{whole[effort][each].mean():.4f}" for each in sets),
                 f"{whole[effort].mean():.4f}",
                 "",
+                f"{np.median(whole[effort]):.4f}",
+                "",
             ]
         )
         for part in parts():
@@ -254,13 +259,16 @@ def main() -> None:
                 worth = whole[effort] - f1(part)
                 error = worth.std(ddof=1) / np.sqrt(len(worth))
                 means = [signed(worth[each].mean()) for each in sets]
-                row = [part.name, part.without, *means, signed(worth.mean()), f"{error:.4f}"]
+                overall = [signed(worth.mean()), f"{error:.4f}", signed(np.median(worth))]
+                count = f"{(worth > 0).sum()} : {(worth < 0).sum()}"
+                row = [part.name, part.without, *means, *overall, count]
                 rows[effort].append(row)
                 print(*row, flush=True)
     for effort, songs in played.items():
         counts = [f"{name} ({len(each)})" for name, each in songs.items()]
         print(f"\nEffort {effort}\n")
-        table(["part", "without it", *counts, "mean", "standard error"], rows[effort])
+        head = ["part", "without it", *counts, "mean", "standard error", "median", "helps : harms"]
+        table(head, rows[effort])
     report(asked.output, facts, {"seconds": SECONDS, "effort 0": rows[0], "effort 1": rows[1]})
 
 

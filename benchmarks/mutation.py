@@ -42,16 +42,23 @@ from cosmic_ray.mutating import mutate_code
 from common import ROOT, machine, parser, report, show_machine, table
 
 ROOMS = {
-    "plan": ("src/pianomime/plan", "tests/plan"),
-    "track": ("src/pianomime/track", "tests/track"),
-    "evaluation": ("src/pianomime/evaluation", "tests/evaluation"),
+    "plan": ("src/pianomime/plan", "tests/plan/test_*.py"),
+    "track": ("src/pianomime/track", "tests/track/test_*.py"),
+    "evaluation": ("src/pianomime/evaluation", "tests/evaluation/test_*.py"),
     "metrics": ("src/pianomime/music/metrics.py", "tests/music/test_metrics*.py"),
 }
 """What is changed in each room, and the tests that should notice."""
+FIRST = {
+    "plan": ["test_fingering_costs.py", "test_stored_fingerings.py"],
+    "track": ["test_stored_controls.py", "test_dynamic_control.py", "test_sampling_by_hand.py"],
+    "evaluation": ["test_diagnose.py", "test_reuse.py"],
+    "metrics": [],
+}
+"""The tests that are tried first, for they are quick and notice most."""
 EQUIVALENT = Path(__file__).with_suffix(".json")
 JOBS = 2
 SLOWEST = 4.0
-"""A mutant's tests may take this many times as long as those of the program as it is."""
+"""Unless told otherwise, a mutant's tests may take this many times as long as the program's."""
 
 
 @dataclass(frozen=True)
@@ -137,18 +144,15 @@ def _annotations(code: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
 
 
 def copies(folder: Path) -> Queue[Path]:
-    """Copies of what the tests need, one for each job."""
+    """Copies of what the tests of the rooms need, one for each job."""
     made: Queue[Path] = Queue()
     for job in range(JOBS):
         copy = folder / str(job) / "repository"
         copy.mkdir(parents=True)
-        for name in ("src", "tests", "benchmarks", "docs", "examples"):
-            shutil.copytree(
-                ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__")
-            ) if (ROOT / name).is_dir() else None
-        for file in ROOT.iterdir():
-            if file.is_file():
-                shutil.copy(file, copy / file.name)
+        for name in ("src", "tests", "docs"):
+            ignored = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(ROOT / name, copy / name, ignore=ignored)
+        shutil.copy(ROOT / "pyproject.toml", copy)
         made.put(copy)
     return made
 
@@ -166,7 +170,9 @@ def failing(copy: Path, room: str, limit: float) -> str:
         "OMP_NUM_THREADS": "1",
     }
     environment.pop("PIANOMIME_SHARED", None)
-    tests = sorted(str(path.relative_to(copy)) for path in copy.glob(ROOMS[room][1]))
+    known = sorted(copy.glob(ROOMS[room][1]))
+    order = sorted(known, key=lambda path: (path.name not in FIRST[room], path.name))
+    tests = [str(path.relative_to(copy)) for path in order]
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider"]
     process = subprocess.Popen(
         [*command, "--hypothesis-seed=0", *tests],
@@ -213,6 +219,7 @@ def main() -> None:
     arguments.add_argument("--count", type=int, default=30, help="mutants of each room")
     arguments.add_argument("--seed", type=int, default=0, help="of the sample")
     arguments.add_argument("--again", action="store_true", help="try the last survivors alone")
+    arguments.add_argument("--limit", type=float, help="time for the tests of one mutant [s]")
     asked = arguments.parse_args()
     facts = machine()
     show_machine(facts)
@@ -223,8 +230,8 @@ def main() -> None:
     verdict = {row["name"]: row["killed_by"] for row in known}
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
         free = copies(Path(folder))
-        limits = {}
-        for room in asked.rooms:
+        limits = dict.fromkeys(asked.rooms, asked.limit)
+        for room in asked.rooms if asked.limit is None else ():
             began = time.monotonic()
             copy = free.get()
             wrong = failing(copy, room, 1200.0)
