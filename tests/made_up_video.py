@@ -147,7 +147,7 @@ def plan_of(score: Score) -> FingertipPlan:
 
 
 class TrueHands:
-    """Stands in for MediaPipe: tells where the hands were drawn, with noise and mistakes.
+    """Stands in for MediaPipe: returns where the hands were drawn, with noise and mistakes.
 
     Args:
         plane: of the video's pictures.

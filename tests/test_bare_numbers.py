@@ -49,7 +49,7 @@ ALLOWED = {
     # Times that have nothing to do with frames [s].
     ("music/metrics.py", "ONSET_TOLERANCE = 0.05"),
     ("songs/notation.py", "RELEASE = 0.05"),
-    ("video/hands/model.py", "_SECONDS = 30"),
+    ("video/hands/model.py", "_TIMEOUT = 30.0"),
     # Shares, probabilities and costs.
     ("evaluation/diagnose.py", "_TOUCHED = 0.05"),
     ("learn/envs/reward.py", "KEY_BOUND, KEY_MARGIN = 0.05"),
@@ -62,8 +62,8 @@ ALLOWED = {
     ("archive.py", "_BLOCK = 1 << 20"),
     ("learn/fingers/training.py", "_CHECKPOINT_UPDATES = 20"),
     ("policies/methods.py", "Sampler(20)"),
-    ("video/film/film.py", "guessed_rate or 30"),
-    ("video/hands/detector.py", "_POINTS = [0, 4, 8, 12, 16, 20]"),
+    ("video/film/film.py", "_USUAL_RATE = 30.0"),
+    ("video/hands/detector.py", "_LANDMARKS = [0, 4, 8, 12, 16, 20]"),
     ("video/notes/key_light.py", "_FEWEST = 20"),
     ("video/parallax.py", "_FEWEST = 20"),
 }

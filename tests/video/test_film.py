@@ -38,10 +38,10 @@ def test_steady_rate_from_any_rate(tmp_path, fps, seed):
     due = np.arange(len(frames)) / 20
     assert abs(len(frames) - 20 * shown[-1]) <= 2
     nearest = shown[np.abs(shown[None] - due[:, None]).argmin(axis=1)]
-    told = np.array([frame.seconds for frame in frames])
-    np.testing.assert_allclose(np.abs(told - due), np.abs(nearest - due), atol=1e-3)
+    seconds = np.array([frame.seconds for frame in frames])
+    np.testing.assert_allclose(np.abs(seconds - due), np.abs(nearest - due), atol=1e-3)
     level = np.array([frame.picture.mean() for frame in frames])
-    np.testing.assert_allclose(level, 20 + 50 * told, atol=4)
+    np.testing.assert_allclose(level, 20 + 50 * seconds, atol=4)
 
 
 @pytest.mark.parametrize(("fps", "seed"), [(24, None), (30, 3)])

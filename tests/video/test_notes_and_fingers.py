@@ -12,7 +12,7 @@ from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.notes.fingers import find_note_fingers
 from pianomime.video.notes.offset import estimate_offset
 from pianomime.video.notes.reading import read_notes
-from pianomime.video.parallax import take_back_parallax
+from pianomime.video.parallax import correct_parallax
 from pianomime.world.parameters import key_centres
 
 DARK = 40
@@ -194,5 +194,5 @@ def test_parallax_is_taken_back(score, points):
     bent[..., 1] = 1.03 * bent[..., 1] + 0.003
     fingers = find_note_fingers(score, points, BOTH)
     before = np.abs(bent - points)[..., 1].mean()
-    take_back_parallax(bent, score, fingers)
+    correct_parallax(bent, score, fingers)
     assert np.abs(bent - points)[..., 1].mean() < 0.6 * before

@@ -32,8 +32,8 @@ def test_points_are_clicked_and_saved(video, tmp_path):
     plane = made_up.camera(SIZE)
     points = {name: plane.to_pixels(place_of(name)).tolist() for name in SUGGESTED}
     with PickPage(Film(video), out) as page:
-        told = []
-        waiting = threading.Thread(target=lambda: told.append(page.wait()))
+        saved = []
+        waiting = threading.Thread(target=lambda: saved.append(page.wait()))
         waiting.start()
         html = urllib.request.urlopen(page.url).read().decode()
         assert "A0 front left" in html
@@ -52,11 +52,11 @@ def test_points_are_clicked_and_saved(video, tmp_path):
         assert not out.exists()
         assert b"Saved" in post({"points": points}).read()
         waiting.join(10)
-    assert told == [read_points(out).describe()]
+    assert saved == [read_points(out).describe()]
 
 
 def test_a_browser_that_says_nothing_does_not_hold_up_the_others(video, tmp_path, monkeypatch):
-    monkeypatch.setattr(pick_page, "_PATIENCE", 0.2)
+    monkeypatch.setattr(pick_page, "_TIMEOUT", 0.2)
     with PickPage(Film(video), tmp_path / "points.json") as page:
         place = ("127.0.0.1", int(page.url.rsplit(":", 1)[1].strip("/")))
         with socket.create_connection(place):

@@ -82,5 +82,5 @@ def test_bad_points_are_one_line(tmp_path, text):
 
 
 def test_white_keys_have_no_front_alone():
-    with pytest.raises(InputError, match="no point"):
+    with pytest.raises(InputError, match="not a point"):
         place_of("C4 front")

@@ -126,9 +126,9 @@ def test_what_is_wrong_shows_before_the_work(video, midi, hands, tmp_path, capsy
         with pytest.raises(SystemExit) as stopped:
             cli.main([*given, *more])
         assert stopped.value.code == 2
-        told = capsys.readouterr().err.strip()
-        assert why in told
-        assert "\n" not in told
+        printed = capsys.readouterr().err.strip()
+        assert why in printed
+        assert "\n" not in printed
 
 
 def test_too_long_a_video_shows_before_the_work(video, hands, monkeypatch, untouched):
@@ -270,9 +270,9 @@ def test_no_keyboard_and_no_hands(hands, tmp_path, monkeypatch, video, midi, cap
         with pytest.raises(SystemExit) as stopped:
             cli.main(["retarget", str(path), "--midi", str(midi), *model])
         assert stopped.value.code == 2
-        told = capsys.readouterr().err.strip()
-        assert why in told
-        assert "\n" not in told
+        printed = capsys.readouterr().err.strip()
+        assert why in printed
+        assert "\n" not in printed
     assert not out.parent.exists()
 
 

@@ -9,16 +9,16 @@ from typing import Annotated, Literal
 import tyro
 
 _REMARKS = 10
-"""That are printed; hours of video make hundreds."""
+"""Most remarks that are printed; hours of video can have hundreds."""
 
 
 @dataclass(frozen=True)
 class Retarget:
-    """Make a demonstration of a video of somebody playing, seen from above.
+    """Make a demonstration of a video of a person who plays, filmed from above.
 
-    DEMO.npz can then be played: `pianomime play DEMO.npz`. Beside it lie a page that shows how
-    well hands and keys were seen (DEMO-seen.html) and the video with what was seen drawn into it
-    (DEMO-seen.mp4).
+    The result can be played with `pianomime play DEMO.npz`. Two files beside it show how well
+    hands and keys were seen: a page (DEMO-seen.html), and the video with hands, keys and fingers
+    drawn into it (DEMO-seen.mp4).
 
     Examples:
       pianomime retarget VIDEO.mp4 --midi SONG.mid
@@ -27,27 +27,27 @@ class Retarget:
     """
 
     video: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="VIDEO")]
-    """Any video in which a keyboard is seen from above."""
+    """A video of a keyboard from above."""
     midi: Annotated[Path | None, tyro.conf.arg(metavar="SONG.mid")] = None
-    """What is played; if not given it is read off the video, where keys light up."""
+    """MIDI file of what is played; by default the notes are read from keys that light up."""
     points: Annotated[Path | None, tyro.conf.arg(metavar="POINTS.json")] = None
-    """Where the keyboard is, from `pianomime pick`; found by itself if not given."""
+    """Points of the keyboard from `pianomime pick`; by default it is found automatically."""
     offset: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
-    """When in the video the MIDI file begins [s], negative if before it; estimated if not given."""
+    """When the MIDI file begins in the video [s], negative if before it; by default estimated."""
     hand_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """MediaPipe's hand_landmarker.task; downloaded once if not given."""
+    """MediaPipe's hand_landmarker.task; by default downloaded once."""
     align: Literal["steady", "paper"] = "steady"
-    """How fingertips are put on keys: the house's way, or step 3 of the paper's appendix A."""
+    """How fingertips are moved onto keys: smoothly, or as in the paper's appendix A, step 3."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="DEMO.npz")] = None
-    """The demonstration; out/VIDEO.npz if not given."""
+    """File for the demonstration; by default out/VIDEO.npz."""
     overlay: bool = True
-    """Draw a video of what was seen."""
+    """Write DEMO-seen.mp4."""
 
     def run(self) -> None:
-        """Make the demonstration and tell how good it is.
+        """Make the demonstration, and print how good it is.
 
         Raises:
-            InputError: no demonstration can be made of what was given.
+            InputError: no demonstration can be made from these files.
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.progress import bars
@@ -59,17 +59,17 @@ class Retarget:
 
         out = self.out or Path("out", self.video.stem + ".npz")
         if out.suffix != ".npz":
-            raise InputError(f"{out}: a demonstration is a file that ends in .npz")
+            raise InputError(f"{out}: the name of a demonstration must end in .npz")
         if out.exists() and out.is_dir():
             raise InputError(f"{out}: is a folder; a file is needed")
-        # Names that nobody else gives: an earlier one of ours is replaced, or removed.
+        # Files of these names are from earlier runs: they are replaced, or removed.
         overlay, page = (out.with_name(f"{out.stem}-seen{end}") for end in (".mp4", ".html"))
         ours = {file.name for file in (out, overlay, page)}
         if self.video.resolve() in (overlay.resolve(), page.resolve(), out.resolve()):
             raise InputError(f"{self.video}: would be overwritten; give OUT another name")
         config = RetargetConfig(self.midi, self.points, self.offset, self.hand_model, self.align)
-        # The folder first: that it cannot be written shows before the work, not after. Whoever
-        # interrupts this finds no picture of a demonstration that is not there.
+        # The folder first: if it cannot be written, this fails before the work, not after. All
+        # files appear together, so that an interruption leaves no page without its demonstration.
         with staged(out.parent, ours) as folder, bars() as progress:
             made = retarget(self.video, config, progress)
             if self.overlay:
@@ -83,6 +83,6 @@ class Retarget:
         for remark in made.remarks[:_REMARKS]:
             print(f"note: {remark}")
         if len(made.remarks) > _REMARKS:
-            print(f"note: {len(made.remarks) - _REMARKS} more such notes are in the page")
-        print(f"look: {page}")
-        print(f"play it: pianomime play {out}")
+            print(f"note: {len(made.remarks) - _REMARKS} more such notes are on the page")
+        print(f"page: {page}")
+        print(f"next: pianomime play {out}")

@@ -40,8 +40,8 @@ class Piece:
     """A piece.
 
     Attributes:
-        title: what it is.
-        tempo: beats a minute.
+        title: its name.
+        tempo: beats per minute.
         bar: beats in a bar.
         voices: the lines that sound together.
         pedal: a line of `P` and `r`.
@@ -56,18 +56,21 @@ class Piece:
     upbeat: float = 0.0
 
 
-def to_score(song: Piece) -> Score:
-    """Read the notation.
+def to_score(piece: Piece) -> Score:
+    """Read a piece.
+
+    Args:
+        piece: a piece in this notation.
 
     Raises:
         ScoreError: a note is misspelt or a bar does not add up.
     """
-    beat = 60 / song.tempo
+    beat = 60 / piece.tempo
     notes: list[tuple[int, float, float, int]] = []
-    for voice in song.voices:
-        for names, start, length in _events(song, voice.text, voice.unit):
+    for voice in piece.voices:
+        for names, start, length in _events(piece, voice.text, voice.unit):
             onset, seconds = start * beat, length * beat
-            accent = 8 if (start - song.upbeat) % song.bar == 0 else 0
+            accent = 8 if (start - piece.upbeat) % piece.bar == 0 else 0
             for name in names:
                 # A short note keeps at least half its length.
                 offset = onset + max(seconds - RELEASE, seconds / 2)
@@ -75,7 +78,7 @@ def to_score(song: Piece) -> Score:
     keys, onsets, offsets, velocities = zip(*notes, strict=True)
     pedal = [
         (start * beat, (start + length) * beat - RELEASE)
-        for _, start, length in _events(song, song.pedal, song.bar)
+        for _, start, length in _events(piece, piece.pedal, piece.bar)
     ]
     return Score(
         key=np.array(keys),
@@ -83,19 +86,19 @@ def to_score(song: Piece) -> Score:
         offset=np.array(offsets),
         velocity=np.array(velocities),
         pedal=np.array(pedal),
-        title=song.title,
+        title=piece.title,
     )
 
 
-def _events(song: Piece, text: str, unit: float) -> list[tuple[list[str], float, float]]:
-    """What sounds in one line: names, start and length, both in beats."""
+def _events(piece: Piece, text: str, unit: float) -> list[tuple[list[str], float, float]]:
+    """Notes of one line: names, start and length; both times in beats."""
     events = []
-    start, now, bar_end = 0.0, 0.0, song.upbeat or song.bar
+    start, now, bar_end = 0.0, 0.0, piece.upbeat or piece.bar
     for token in text.split():
         if token == "|":
-            if now < bar_end or start >= bar_end or (now - bar_end) % song.bar:
-                raise ScoreError(f"{song.title}: bar ends at beat {now}, not {bar_end}")
-            bar_end = now + song.bar
+            if now < bar_end or start >= bar_end or (now - bar_end) % piece.bar:
+                raise ScoreError(f"{piece.title}: bar ends at beat {now}, not {bar_end}")
+            bar_end = now + piece.bar
             continue
         name, _, length = token.partition("*")
         beats = float(length) if length else unit

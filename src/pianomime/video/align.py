@@ -1,4 +1,4 @@
-"""From tracked hands and the finger of every note to a FingertipPlan."""
+"""Alignment of fingertips with the keys they press: from tracked hands to a FingertipPlan."""
 
 from __future__ import annotations
 
@@ -17,19 +17,25 @@ from pianomime.video.notes.fingers import NoteFingers
 from pianomime.world.parameters import key_centres, key_half_sizes
 
 Rule = Literal["steady", "paper"]
-"""How fingertips are put on their keys."""
+"""How fingertips are aligned with keys, see `align`."""
 
 _LEAD = 8
-"""Frames over which a finger comes over to where it presses, and goes back."""
+"""Frames over which a finger moves from where it was tracked to where it presses, and back."""
 _WHITE_X = (-0.020, 0.072)
+"""[m] Range of world x in which fingertips press white keys; further back, keys need more force."""
 _BLACK_X = (-0.055, 0.008)
-"""[m] world x between which a fingertip is on its key; behind, keys need too much force."""
+"""[m] Range of world x in which fingertips press black keys."""
 
 
 def raised(points: NDArray[np.floating], frames: int) -> NDArray[np.float64]:
-    """(frames, 2, 6, 3) points (T, 2, 6, 2) that press nothing: at `HOVER_HEIGHT`.
+    """Points at `HOVER_HEIGHT`, pressing nothing, for a number of frames.
 
-    Where there are too few the last ones are held, and where there are too many they are left out.
+    Args:
+        points: (T, 2, 6, 2) tracked points, world x, y [m].
+        frames: number of frames; if there are more than T, the last points are repeated.
+
+    Returns:
+        (frames, 2, 6, 3) world frame [m].
     """
     high = np.full((frames, *points.shape[1:3], 3), HOVER_HEIGHT)
     high[: len(points), ..., :2] = points[:frames]
@@ -40,16 +46,15 @@ def raised(points: NDArray[np.floating], frames: int) -> NDArray[np.float64]:
 def align(
     score: Score, fingertips: NDArray[np.float64], fingers: NoteFingers, rule: Rule = "steady"
 ) -> FingertipPlan:
-    """Put the fingertips that press on the keys that they press.
+    """Move fingertips that press onto the middle lines of their keys, at z = 0.
 
     Args:
-        score: its times are those of the fingertips.
-        fingertips: (T, 2, 6, 3) `raised`, a row for each frame of the score. They are changed in
-            place, and are those of the plan: two of them for hours would fill the memory.
-        fingers: who plays each note. The paper's rule does without.
-        rule: "steady": each finger stays where it pressed for as long as it does, in the middle of
-            its key, and moves there and away smoothly. "paper": appendix A, step 3, frame by
-            frame.
+        score: the notes, in the time of the fingertips.
+        fingertips: (T, 2, 6, 3) points as `raised` returns them, a row for each frame of the
+            score. To save memory they are changed in place, and become those of the plan.
+        fingers: the finger that plays each note; the paper's rule does not use it.
+        rule: "steady" keeps a finger in one place for as long as it presses, and moves it there
+            and back smoothly; "paper" is step 3 of the paper's appendix A, frame by frame.
     """
     if rule == "paper":
         return _as_in_the_paper(score, fingertips)
@@ -67,9 +72,9 @@ def align(
 
 
 def _shift(tip: NDArray[np.float64], keys: NDArray[np.int8]) -> NDArray[np.float64]:
-    """(T, 2) what to add to one fingertip so that it presses its keys (T,)."""
+    """(T, 2) Displacement of one fingertip (T, 2) that puts it on its keys (T,) [m]."""
     frames = len(tip)
-    # A row more, of nothing, for before the first key and after the last one.
+    # One more row, of zeros, serves as the press before the first and after the last.
     shift = np.zeros((frames + 1, 2))
     begins, ends = [], [0]
     edges = np.flatnonzero(np.diff(keys, prepend=NO_KEY, append=NO_KEY)).tolist()
@@ -79,12 +84,12 @@ def _shift(tip: NDArray[np.float64], keys: NDArray[np.int8]) -> NDArray[np.float
             continue
         low, high = _BLACK_X if BLACK[key] else _WHITE_X
         place = [np.clip(np.median(tip[first:end, 0]), low, high), key_centres()[key, 1]]
-        # It comes down from above its key: the frame before counts as one in which it presses.
+        # The finger comes down vertically: in the frame before, it already is over its key.
         first -= first > 0 and keys[first - 1] == NO_KEY
         shift[first:end] = place - tip[first:end]
         begins.append(first)
         ends.append(end)
-    # Before and after, less and less of it.
+    # Between presses, displacements fade out and in.
     for gone, coming in zip(ends, [*begins, frames], strict=True):
         frame = np.arange(gone, coming)[:, None]
         behind = np.clip(1 - (frame - gone + 1) / _LEAD, 0, 1) * (gone > 0)
@@ -95,10 +100,10 @@ def _shift(tip: NDArray[np.float64], keys: NDArray[np.int8]) -> NDArray[np.float
 
 
 def _as_in_the_paper(score: Score, fingertips: NDArray[np.float64]) -> FingertipPlan:
-    """Appendix A, steps 3 and 4, frame by frame.
+    """Steps 3 and 4 of the paper's appendix A, frame by frame.
 
-    A finger on the key that is to be pressed, or else the nearest free one over the keys beside
-    it, is moved to its middle line; if there is none, nothing is done.
+    Of the free fingers on a key that should be down, or else over the keys beside it, the nearest
+    one is moved to the key's middle line; if there is none, the key is not pressed.
     """
     centres, half = key_centres(), key_half_sizes()
     finger_key = np.full((len(fingertips), 2, 5), NO_KEY, np.int8)

@@ -1,4 +1,4 @@
-"""What was seen, drawn into a picture of the video."""
+"""Drawing of key grid, hands and pressed keys into pictures of the video."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ from pianomime.video.keyboard.plane import Plane
 from pianomime.world.parameters import key_centres, key_half_sizes
 
 HAND_COLOURS = ((255, 176, 0), (0, 200, 255))
-"""Of the left and the right hand."""
+"""Colours (red, green, blue) of the left and the right hand, 0..255."""
 _LOST = (255, 60, 60)
+"""Colour of hands that were not seen."""
 _GRID = (90, 255, 120)
+"""Colour of the outlines of the keys."""
 
 
 def key_outline(key: int) -> NDArray[np.float64]:
-    """(4, 2) world x, y [m] of a key's corners."""
+    """(4, 2) World x, y of a key's corners, clockwise from the far bass corner [m]."""
     _, y, _ = key_centres()[key]
     half = key_half_sizes()[key, 1] if BLACK[key] else WHITE_WIDTH / 2
     front = BLACK_FRONT if BLACK[key] else FRONT
@@ -27,10 +29,14 @@ def key_outline(key: int) -> NDArray[np.float64]:
 
 
 class Drawing:
-    """Draws over pictures of one size, taken from one place."""
+    """Draws into pictures of one video, whose camera does not move."""
 
     def __init__(self, plane: Plane) -> None:
-        """Prepare for pictures of which `plane` is the plane."""
+        """Prepare to draw.
+
+        Args:
+            plane: plane of the keyboard in these pictures.
+        """
         self._plane = plane
         self._outlines = [plane.to_pixels(key_outline(key)) for key in range(KEYS)]
 
@@ -41,13 +47,16 @@ class Drawing:
         found: NDArray[np.bool_],
         finger_key: NDArray[np.int8],
     ) -> NDArray[np.uint8]:
-        """A picture with key grid, hands, pressed keys and the number of the finger on each.
+        """Draw key grid, hands, pressed keys and the finger on each.
 
         Args:
-            picture: (height, width, 3).
-            points: (2, 6, 2) world x, y [m] of both hands.
-            found: (2,) hands that were seen; the others are drawn in red.
-            finger_key: (2, 5) key that each finger presses.
+            picture: (height, width, 3) uint8; it is not changed.
+            points: (2, 6, 2) world x, y of both hands' points [m].
+            found: (2,) bool, hands that were seen; the others are drawn in red.
+            finger_key: (2, 5) key that each finger presses, -1 for none.
+
+        Returns:
+            (height, width, 3) uint8.
         """
         image = Image.fromarray(picture).convert("RGB")
         pen = ImageDraw.Draw(image, "RGBA")

@@ -1,4 +1,4 @@
-"""The video with what was seen drawn into it."""
+"""Video with landmarks, key grid, pressed keys and fingering drawn into it."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from pianomime.keyboard import FRAME_RATE, NO_KEY
 from pianomime.progress import Progress, no_progress
 from pianomime.video.drawing import Drawing
 from pianomime.video.retarget import Retargeted
+from pianomime.world.layout import FINGER_COUNT
 
 
 def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress) -> None:
-    """Film the landmarks, the key grid, the pressed keys and the fingering, 20 frames a second.
+    """Write the video at 20 pictures per second, without sound.
 
     Args:
-        made: what was made of a video.
-        path: MP4 file; appears only when complete.
-        progress: told the frames done and in all.
+        made: the retargeted video.
+        path: MP4 file; it appears only when complete.
+        progress: called after every frame, in the phase "overlay".
     """
     drawing = Drawing(made.plane)
     finger_key = made.demonstration.plan.finger_key
-    nothing = np.full((2, 5), NO_KEY, np.int8)
+    nothing = np.full((2, FINGER_COUNT), NO_KEY, np.int8)
     tracks = made.tracks
     with (
         atomic(path) as temporary,
@@ -42,7 +43,7 @@ def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress
                 tracks.found[number],
                 finger_key[number] if number < len(finger_key) else nothing,
             )
-            # H.264 wants even sizes.
+            # H.264 needs an even size.
             drawn = drawn[: drawn.shape[0] // 2 * 2, : drawn.shape[1] // 2 * 2]
             if stream is None:
                 stream = film.add_stream("libx264", rate=round(FRAME_RATE))

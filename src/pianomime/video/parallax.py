@@ -1,8 +1,9 @@
-"""Fingertips as they would be seen from right above.
+"""Correction of parallax along the keyboard.
 
-A landmark lies on the finger, a centimetre or two above the key's top, so a camera over the middle
-sees it too far out, the farther from the middle the more. How much is measured on the notes: a
-finger that plays a key is over it.
+A landmark lies on the finger, a centimetre or two above the top of the key. A camera over the
+middle of the keyboard sees it too far outward, the more so the further out it is. The shift and
+the stretch that this causes are estimated from the notes, since a finger that plays a key is over
+it.
 """
 
 from __future__ import annotations
@@ -15,23 +16,27 @@ from pianomime.video.notes.fingers import NoteFingers
 from pianomime.world.parameters import key_centres
 
 _FEWEST = 20
-"""Notes."""
+"""Least number of notes for an estimate."""
 _SHORTEST = 0.2
-"""[m] of keyboard that they must span."""
+"""[m] Least part of the keyboard that the notes must span for an estimate of the stretch."""
 _MOST_SHIFT = 0.008
+"""[m] Largest shift that is corrected."""
 _MOST_STRETCH = 0.05
+"""Largest stretch that is corrected."""
+_PAIRS = 4000
+"""Pairs of notes whose slopes the stretch is estimated from."""
 
 
-def take_back_parallax(points: NDArray[np.float64], score: Score, fingers: NoteFingers) -> float:
-    """Take back a shift and a stretch along the keyboard, where the notes tell them.
+def correct_parallax(points: NDArray[np.float64], score: Score, fingers: NoteFingers) -> float:
+    """Estimate shift and stretch along the keyboard from the notes, and remove them.
 
     Args:
-        points: (T, 2, 6, 2 or 3) world x, y and perhaps z [m]; changed in place.
-        score: its times are those of the points.
-        fingers: who seems to have played each note.
+        points: (T, 2, 6, 2) or (T, 2, 6, 3) world x, y and z [m]; changed in place.
+        score: the notes, in the time of the points.
+        fingers: the finger that probably played each note.
 
     Returns:
-        By how many millimetres the fingers that play were moved, in the middle of all cases.
+        Median displacement of the fingers that play [mm]; 0 with too few notes.
     """
     sure = np.flatnonzero(~fingers.guessed)
     if len(sure) < _FEWEST:
@@ -42,9 +47,10 @@ def take_back_parallax(points: NDArray[np.float64], score: Score, fingers: NoteF
     low, high = np.percentile(seen, [5, 95])
     stretch = 0.0
     if high - low >= _SHORTEST:
-        # From the middle of the slopes between all pairs that are well apart (Theil and Sen).
-        draw = np.random.default_rng(0)
-        one, two = draw.integers(0, len(sure), (2, 4000))
+        # The Theil-Sen estimator (Theil 1950, Sen 1968): the median of the slopes between pairs,
+        # here of random pairs that are well apart.
+        rng = np.random.default_rng(0)
+        one, two = rng.integers(0, len(sure), (2, _PAIRS))
         apart = np.abs(seen[one] - seen[two]) > _SHORTEST / 2
         if apart.any():
             slopes = (off[one] - off[two])[apart] / (seen[one] - seen[two])[apart]

@@ -33,7 +33,7 @@ from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.offset import Offset, estimate_offset
 from pianomime.video.notes.reading import read_notes
-from pianomime.video.parallax import take_back_parallax
+from pianomime.video.parallax import correct_parallax
 
 _BACKGROUND_FRAMES = 25
 _MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
@@ -105,7 +105,7 @@ def retarget(
     # Worked on in place: these become the plan.
     fingertips = raised(seen.tracks.points, timed.score.frames())
     fingers = find_note_fingers(timed.score, fingertips, seen.tracks.seen)
-    parallax = take_back_parallax(fingertips, timed.score, fingers)
+    parallax = correct_parallax(fingertips, timed.score, fingers)
     fingers = find_note_fingers(timed.score, fingertips, seen.tracks.seen)
     plan = align(timed.score, fingertips, fingers, config.align)
     remarks = [

@@ -1,4 +1,4 @@
-"""One page that shows how well hands and keys were seen."""
+"""Page that shows how well hands, keys and notes were seen in a video."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pianomime.video.retarget import Retargeted
 
 _PICTURES = 3
 _MOST_POINTS = 20_000
-"""Of a line: the picture has some thousand columns, and cannot show more."""
+"""Most points of a plotted line; the picture has some thousand columns."""
 
 _PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>$title</title>
@@ -31,13 +31,13 @@ body { max-width: 72rem; margin: 2rem auto; padding: 0 1rem; line-height: 1.5; }
 img { width: 100%; } table { border-collapse: collapse; }
 td { padding: .2rem 1rem .2rem 0; vertical-align: top; } li { margin: .2rem 0; }
 </style></head><body><h1>$title</h1>
-<h2>To know</h2>$remarks
+<h2>Remarks</h2>$remarks
 <h2>Where tracking was poor</h2>
-<p>Red: not seen, and filled in from before and after. Below, each note: how far its finger was
-from its key when it was struck.</p>
+<p>Red: the hand was not seen, and its position is interpolated. Below: the distance of each note's
+finger from its key at the onset.</p>
 <img alt="tracking over time" src="$timeline">
-<h2>What was seen</h2>$pictures
-<h2>Figures</h2><table>$figures</table></body></html>
+<h2>Frames of the video</h2>$pictures
+<h2>Quality</h2><table>$quality</table></body></html>
 """)
 
 
@@ -45,22 +45,21 @@ def write_summary(made: Retargeted, path: Path) -> None:
     """Write the page.
 
     Args:
-        made: what was made of a video.
-        path: HTML file, with everything in it; appears only when complete.
+        made: the retargeted video.
+        path: self-contained HTML file; it appears only when complete.
     """
-    quality = made.demonstration.quality
     remarks = "".join(f"<li>{escape(remark)}</li>" for remark in made.remarks)
     page = _PAGE.substitute(
         title=escape(f"Retargeting {made.demonstration.source}"),
-        remarks=f"<ul>{remarks}</ul>" if remarks else "<p>Nothing: all went well.</p>",
+        remarks=f"<ul>{remarks}</ul>" if remarks else "<p>None.</p>",
         timeline=_data(_timeline(made)),
         pictures="".join(
             f'<p><img alt="keys and hands" src="{_data(_png(picture))}"></p>'
             for picture in _pictures(made)
         ),
-        figures="".join(
+        quality="".join(
             f"<tr><td>{escape(name.replace('_', ' '))}</td><td>{escape(str(value))}</td></tr>"
-            for name, value in quality.items()
+            for name, value in made.demonstration.quality.items()
             if name != "remarks"
         ),
     )
@@ -69,6 +68,7 @@ def write_summary(made: Retargeted, path: Path) -> None:
 
 
 def _timeline(made: Retargeted) -> bytes:
+    """PNG of both hands and of the misfit of every note over time."""
     tracks, score, fingers = made.tracks, made.demonstration.score, made.fingers
     figure = Figure(figsize=(12, 4.5), layout="constrained")
     hands, notes = figure.subplots(2, 1, sharex=True)
@@ -93,7 +93,7 @@ def _timeline(made: Retargeted) -> bytes:
 
 
 def _pictures(made: Retargeted) -> list[NDArray[np.uint8]]:
-    """Frames with many notes, one from each part of the video."""
+    """From each third of the video the frame with the most pressed keys, drawn over."""
     finger_key = made.demonstration.plan.finger_key
     count = min(len(finger_key), len(made.tracks))
     busy = (finger_key[:count] >= 0).sum(axis=(1, 2))

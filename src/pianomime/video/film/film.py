@@ -1,4 +1,4 @@
-"""Reading videos: frames at a steady rate whatever the file's own, in flat memory."""
+"""Reader of video files: frames at a constant rate, whatever the file's own, in constant memory."""
 
 from __future__ import annotations
 
@@ -18,20 +18,22 @@ from pianomime.errors import InputError
 from pianomime.video.film.read_ahead import ahead
 
 _WIDEST = 1280
-"""Larger pictures are shrunk to this size [pixels]: hands and keys are plain enough in them."""
+"""[pixels] Larger pictures are shrunk to this size, which is enough to see hands and keys."""
 
 _STRIDE = 15
-"""Frames."""
+"""Frames between two samples that begin at the same key frame of the video."""
+_USUAL_RATE = 30.0
+"""[Hz] Assumed rate of a video whose header has none."""
 
 _SHRINKING = av.video.reformatter.Interpolation.AREA
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One picture.
+    """One picture of a video.
 
     Attributes:
-        seconds: when it is shown, counted from the first frame of the video [s].
+        seconds: time since the first frame of the video [s].
         picture: (height, width, 3) uint8, at the film's working size.
     """
 
@@ -40,20 +42,24 @@ class Frame:
 
 
 class Film:
-    """A video file; every pass over its frames opens it anew, so passes do not disturb each other.
+    """A video file. Every pass over its frames opens the file anew, so passes are independent.
 
     Attributes:
         path: the file.
-        width, height: of the pictures as they are shown (a turned phone's are turned) [pixels].
-        zoom: that size divided by the working size, in which pictures are given.
-        seconds: length of the video, as its header says; 0 where it does not [s].
+        width: width of the pictures, after the rotation that the file asks for [pixels].
+        height: height of the pictures, after that rotation [pixels].
+        zoom: that size divided by the working size, at which pictures are returned.
+        seconds: length of the video from its header [s]; 0 if it has none.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Look at the file.
+        """Read the header and the first picture.
+
+        Args:
+            path: the file.
 
         Raises:
-            InputError: no such file, not a video, no picture in it.
+            InputError: the file does not exist, is not a video, or has no picture.
         """
         self.path = Path(path)
         if self.path.is_dir():
@@ -70,18 +76,19 @@ class Film:
             self.zoom = max(1.0, max(size) / _WIDEST)
             self._working = tuple(max(2, round(side / self.zoom)) for side in size)
             self.seconds = _length(container, stream)
-            self._interval = 1 / float(stream.average_rate or stream.guessed_rate or 30)
+            self._interval = 1 / float(stream.average_rate or stream.guessed_rate or _USUAL_RATE)
 
     def frames(self, rate: float, first: int = 0) -> Iterator[Frame]:
-        """The frame nearest to first, first + 1, ... / rate seconds, to the end of the video.
+        """The frames nearest to n / rate seconds for n = first, first + 1, ... to the end.
 
-        Where the video has no frame near a moment (variable frame rates, dropped frames), the one
-        that is shown then is given again. A damaged end is left out, with a warning. A few frames
-        are read ahead in a thread of their own.
+        Where the video has no frame near such a time (variable frame rate, dropped frames), the
+        last one is repeated. A damaged end is left out, with a warning. A few frames are read ahead
+        in another thread.
 
         Args:
-            rate: frames a second.
-            first: the frame to begin with; what lies before it is skipped, not read.
+            rate: frames per second [Hz].
+            first: number n of the first frame; frames before it are skipped without decoding
+                them, if the file allows.
         """
         return ahead(self._frames(rate, first))
 
@@ -90,7 +97,7 @@ class Film:
         last: Frame | None = None
         with self._open() as (container, stream):
             stream.thread_type = "AUTO"
-            # Without times in the file only counting from its beginning tells which frame it is.
+            # If the file has no times, frames can only be counted from its beginning.
             if due and self._timed:
                 goal = self._start + due / rate - self._interval
                 with suppress(av.error.FFmpegError):
@@ -104,22 +111,28 @@ class Film:
                     due += 1
                 before = at, frame
             if before is not None:
-                # The last frame is shown for as long as any.
+                # The last frame lasts as long as any.
                 while due / rate < before[0] + min(self._interval, 0.1):
                     last = self._picture(*before, last)
                     yield last
                     due += 1
 
     def sample(self, count: int) -> list[NDArray[np.uint8]]:
-        """Pictures from all over the video.
+        """Pictures spread over the video.
 
-        Not all of it is decoded, unless it does not say how long it is, or nothing in it can be
-        jumped to: then half as many pictures may be given.
+        Only parts of the video are decoded, if its length is known and the file can be searched.
+        Otherwise all of it is decoded, and as few as half of the pictures may be returned.
+
+        Args:
+            count: number of pictures.
+
+        Returns:
+            Pictures (height, width, 3) uint8 at the working size; none if none can be read.
         """
         return (self._jump(count) if self.seconds else []) or self._pass(count)
 
     def _pass(self, count: int) -> list[NDArray[np.uint8]]:
-        """Every n-th picture, n doubled whenever there are too many."""
+        """Every n-th picture of the whole video, with n doubled whenever there are too many."""
         pictures: list[NDArray[np.uint8]] = []
         step = 1
         with self._open() as (container, stream):
@@ -136,6 +149,7 @@ class Film:
         return pictures
 
     def _jump(self, count: int) -> list[NDArray[np.uint8]]:
+        """Pictures at equal distances, found by jumping to the key frames before them."""
         pictures = []
         visits: dict[float, int] = {}
         with self._open() as (container, stream):
@@ -146,8 +160,8 @@ class Film:
                     container.seek(int(goal / stream.time_base), stream=stream)
                 except av.error.FFmpegError:
                     continue
-                # Only key frames can be reached at once; where several goals lead to the same
-                # one, go on a little farther each time.
+                # Only key frames can be jumped to; where several times lead to the same one, each
+                # goes on a little further.
                 skip = -1
                 latest = None
                 for latest in self._decode(container, stream):
@@ -170,7 +184,7 @@ class Film:
 
     @contextmanager
     def _open(self) -> Iterator[tuple[Any, Any]]:
-        """The file, and the stream in it that is the video."""
+        """The open file, and its stream of pictures."""
         try:
             container = av.open(str(self.path))
         except FileNotFoundError:
@@ -181,7 +195,7 @@ class Film:
             pictures = [
                 stream
                 for stream in container.streams.video
-                # The cover of a recording is a stream of one picture.
+                # A cover picture is a video stream of one picture.
                 if not (getattr(stream, "disposition", 0) & av.stream.Disposition.attached_pic)
             ]
             if not pictures:

@@ -1,4 +1,4 @@
-"""MediaPipe's hand landmarker, frame by frame."""
+"""Detection of hands by MediaPipe's hand landmarker, frame by frame."""
 
 from __future__ import annotations
 
@@ -17,18 +17,21 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.video.hands.sightings import Sighting
 
-_POINTS = [0, 4, 8, 12, 16, 20]
-"""MediaPipe's numbers of the wrist and the five fingertips, thumb first."""
+_LANDMARKS = [0, 4, 8, 12, 16, 20]
+"""Indices of MediaPipe's landmarks of the wrist and the fingertips, thumb first."""
 
 
 class HandDetector:
-    """Finds up to two hands in each frame of one video. Use it as a context manager."""
+    """Detects up to two hands in each frame of one video. Use it as a context manager."""
 
     def __init__(self, model: Path) -> None:
         """Load the model.
 
+        Args:
+            model: MediaPipe's hand_landmarker.task.
+
         Raises:
-            InputError: MediaPipe is not installed or cannot be used here, or the file is no model.
+            InputError: MediaPipe is not installed or does not load here, or cannot use the file.
         """
         mediapipe, vision = _mediapipe()
         self._image, self._format = mediapipe.Image, mediapipe.ImageFormat.SRGB
@@ -37,11 +40,11 @@ class HandDetector:
             running_mode=vision.RunningMode.VIDEO,
             num_hands=2,
         )
-        self._chatty = True
+        self._first = True
         try:
             with _quiet():
                 self._landmarker = vision.HandLandmarker.create_from_options(options)
-        except OSError as error:  # its library is loaded only now
+        except OSError as error:  # MediaPipe loads its native library here
             raise InputError(_advice(error)) from error
         except (RuntimeError, ValueError) as error:
             raise InputError(f"{model}: MediaPipe cannot use this hand model") from error
@@ -58,20 +61,23 @@ class HandDetector:
         self._landmarker.close()
 
     def detect(self, picture: NDArray[np.uint8], milliseconds: int) -> list[Sighting]:
-        """The hands in a picture.
+        """Detect the hands in the next picture of the video.
 
         Args:
-            picture: (height, width, 3) red, green, blue.
-            milliseconds: when it is; later than the one before.
+            picture: (height, width, 3) uint8, red, green, blue.
+            milliseconds: time of the picture, later than that of the picture before [ms].
+
+        Returns:
+            Up to two hands, with points as shares of the picture's width and height.
         """
         image = self._image(image_format=self._format, data=picture)
-        # It says what it has to say about itself at the first picture.
-        with _quiet() if self._chatty else nullcontext():
+        # MediaPipe writes messages to stderr at the first picture.
+        with _quiet() if self._first else nullcontext():
             result = self._landmarker.detect_for_video(image, milliseconds)
-        self._chatty = False
+        self._first = False
         sightings = []
         for marks, sides in zip(result.hand_landmarks, result.handedness, strict=True):
-            points = np.array([[marks[point].x, marks[point].y] for point in _POINTS])
+            points = np.array([[marks[point].x, marks[point].y] for point in _LANDMARKS])
             best = sides[0]
             right = best.score if best.category_name == "Right" else 1 - best.score
             sightings.append(Sighting(points, float(right)))
@@ -80,7 +86,7 @@ class HandDetector:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep what a library writes past Python to stderr off the terminal."""
+    """Discard what native code writes to stderr."""
     sys.stderr.flush()
     kept = os.dup(2)
     with open(os.devnull, "w") as nowhere:
@@ -94,8 +100,8 @@ def _quiet() -> Iterator[None]:
 
 def _mediapipe() -> tuple[Any, Any]:
     """The modules `mediapipe` and `mediapipe.tasks.python.vision`."""
-    # MediaPipe imports OpenCV for drawing, which we have no use for and which, in the build that
-    # it asks for, does not load on a machine without libGL.
+    # MediaPipe imports OpenCV for drawing, which is not used here and which, in the build that it
+    # requires, does not load on a machine without libGL.
     stand_in = "cv2" not in sys.modules and not _loads("cv2")
     if stand_in:
         sys.modules["cv2"] = ModuleType("cv2")
@@ -104,7 +110,7 @@ def _mediapipe() -> tuple[Any, Any]:
         return mediapipe, importlib.import_module("mediapipe.tasks.python.vision")
     except ImportError as error:
         raise InputError(
-            f"MediaPipe is needed to see hands: pip install -e '.[video]' ({error})"
+            f"MediaPipe is needed to detect hands: pip install 'pianomime[video]' ({error})"
         ) from error
     except OSError as error:
         raise InputError(_advice(error)) from error

@@ -1,4 +1,4 @@
-"""MediaPipe's hand model: a file that is given, in the cache, or downloaded once."""
+"""File of MediaPipe's hand model: given by the user, cached, or downloaded once."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ URL = (
     + NAME
 )
 SHA256 = "fbc2a30080c3c557093b5ddfc334698132eb341044ccee322ccf8bcf3607cde1"
-_SECONDS = 30
+_TIMEOUT = 30.0
+"""[s] Longest wait for the server."""
 
 
 def find_hand_model(given: Path | None = None, url: str = URL) -> Path:
-    """The file with MediaPipe's hand landmark model.
+    """Find the file of MediaPipe's hand landmark model, or download it.
 
     Args:
-        given: a file to use whatever its version; None for the cached one, which is downloaded
-            and checked if need be.
-        url: where to download it from.
+        given: a file to use, whatever its version; None for the one in the cache, which is
+            downloaded if it is not there, and verified by its checksum.
+        url: address to download it from.
 
     Raises:
-        InputError: no such file, or it cannot be downloaded.
+        InputError: the given file does not exist, or the download fails.
     """
     if given is not None:
         if not given.is_file():
@@ -40,7 +41,7 @@ def find_hand_model(given: Path | None = None, url: str = URL) -> Path:
     if cached.is_file() and _sha256(cached.read_bytes()) == SHA256:
         return cached
     try:
-        with urllib.request.urlopen(url, timeout=_SECONDS) as answer:
+        with urllib.request.urlopen(url, timeout=_TIMEOUT) as answer:
             content: bytes = answer.read()
     except (urllib.error.URLError, HTTPException, OSError, ValueError) as error:
         raise InputError(
@@ -56,7 +57,7 @@ def find_hand_model(given: Path | None = None, url: str = URL) -> Path:
 
 
 def cache_folder() -> Path:
-    """Where downloaded files are kept: PIANOMIME_CACHE, or a folder in the user's cache."""
+    """Folder of downloaded files: PIANOMIME_CACHE if set, else a folder in the user's cache."""
     if "PIANOMIME_CACHE" in os.environ:
         return Path(os.environ["PIANOMIME_CACHE"])
     home = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")

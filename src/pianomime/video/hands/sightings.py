@@ -1,4 +1,4 @@
-"""Hands seen in pictures, and those of a whole video in little memory."""
+"""Hands detected in pictures, and those of a whole video in little memory."""
 
 from __future__ import annotations
 
@@ -9,17 +9,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-_POINTS = 6
-_NUMBERS = 2 * _POINTS + 1
+from pianomime.world.layout import POINT_COUNT
+
+_NUMBERS = 2 * POINT_COUNT + 1
+"""Numbers of one sighting: the coordinates of its points, and how likely it is a right hand."""
 
 
 class Sighting(NamedTuple):
-    """A hand in one frame.
+    """A hand detected in one frame.
 
     Attributes:
-        points: (6, 2) wrist and fingertips, thumb first: 0..1 of the picture's width and height,
-            or in the world [m].
-        right: how sure MediaPipe is that it is a right hand, 0..1.
+        points: (6, 2) wrist and fingertips, thumb first: column and row as shares of the
+            picture's width and height, or world x, y [m].
+        right: MediaPipe's probability that it is a right hand, 0..1.
     """
 
     points: NDArray[np.float64]
@@ -27,17 +29,25 @@ class Sighting(NamedTuple):
 
 
 class Sightings:
-    """The hands in each frame of a video, hours of it: 110 bytes a frame in place of 1000."""
+    """The hands in each frame of a video, in 110 bytes per frame instead of 1000."""
 
     def __init__(self, frames: Iterable[Iterable[Sighting]] = ()) -> None:
-        """Begin with these frames."""
+        """Begin with some frames.
+
+        Args:
+            frames: the hands of each.
+        """
         self._numbers = array("f")
         self._begin = array("Q", [0])
         for frame in frames:
             self.append(frame)
 
     def append(self, frame: Iterable[Sighting]) -> None:
-        """Add a frame."""
+        """Add a frame.
+
+        Args:
+            frame: its hands.
+        """
         for points, right in frame:
             self._numbers.extend(points.ravel().tolist())
             self._numbers.append(right)
@@ -51,7 +61,7 @@ class Sightings:
         """The hands in a frame."""
         begin, end = self._begin[frame], self._begin[frame + 1]
         numbers = np.array(self._numbers[begin:end], np.float64).reshape(-1, _NUMBERS)
-        return [Sighting(row[:-1].reshape(_POINTS, 2), float(row[-1])) for row in numbers]
+        return [Sighting(row[:-1].reshape(POINT_COUNT, 2), float(row[-1])) for row in numbers]
 
     def __iter__(self) -> Iterator[list[Sighting]]:
         """Frame by frame."""

@@ -1,4 +1,4 @@
-"""Where the keys of the world lie, in world x, y: what a picture of a keyboard is matched with."""
+"""Positions of the world's keys in world x, y, which pictures of a keyboard are matched with."""
 
 from __future__ import annotations
 

@@ -22,15 +22,15 @@ _MOST_DOUBT = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Keyboard:
-    """One way to see a keyboard in a picture.
+    """A keyboard found in a picture.
 
     Attributes:
-        plane: from the picture's pixels to the world.
-        seen: (88,) bool, the keys whose edges were found in the picture.
-        error_metres: median distance between where edges are found and where the plane has them.
-        error_pixels: the same in the picture.
-        mirrored: the picture shows the keyboard as in a mirror.
-        doubt: how much speaks against this way of several; the least is the best.
+        plane: plane of the keys' tops in the picture.
+        seen: (88,) bool, keys whose edges were found in the picture.
+        error_metres: median distance of the edges found from those of the world's keys [m].
+        error_pixels: that distance in the picture [pixels].
+        mirrored: whether the picture is mirrored.
+        doubt: number of black keys missing or unexpected, for this octave; the least is the best.
     """
 
     plane: Plane
@@ -41,7 +41,7 @@ class Keyboard:
     doubt: float
 
     def describe(self) -> str:
-        """One line for a person."""
+        """One line for the user."""
         keys = np.flatnonzero(self.seen)
         mirror = ", mirrored" if self.mirrored else ""
         return (
@@ -52,11 +52,14 @@ class Keyboard:
 
 
 def find_keyboards(picture: NDArray[np.float32]) -> list[Keyboard]:
-    """The keyboard in a grey picture (height, width), 0..1, without hands in it if possible.
+    """Find the keyboard in a picture.
+
+    Args:
+        picture: (height, width) brightness, 0..1, preferably without hands.
 
     Returns:
-        Every way to name its octaves that the picture allows, the likeliest first: where the
-        whole keyboard is seen there is one. Empty if there is no keyboard.
+        The keyboard in every octave that the picture allows, the likeliest first; only one where
+        the whole keyboard is visible. Empty if there is no keyboard.
     """
     lines = find_lines(picture)
     if lines is None:
@@ -66,8 +69,7 @@ def find_keyboards(picture: NDArray[np.float32]) -> list[Keyboard]:
         return []
     found = []
     for mirrored in (False, True):
-        # Bass to treble runs along the line or against it: from where the player sits, the bass
-        # is to the left.
+        # Bass to treble runs along the line or against it: seen by the player, the bass is left.
         flipped = (zones.front < zones.far) != mirrored
         for name in _namings(picture, lines, zones, flipped):
             rough = _rough_plane(lines, zones, name)
@@ -75,7 +77,7 @@ def find_keyboards(picture: NDArray[np.float32]) -> list[Keyboard]:
             if refined is not None:
                 plane, seen, metres, pixels = refined
                 found.append(Keyboard(plane, seen, metres, pixels, mirrored, name.doubt))
-    # A mirror only where nothing else explains what is seen: half a keyboard looks the same.
+    # Half a keyboard looks the same in a mirror, so that is assumed only if nothing else fits.
     found.sort(key=lambda way: (way.doubt + 0.5 * way.mirrored, way.error_metres))
     if not found or found[0].doubt > _MOST_DOUBT * len(lines.blacks):
         return []
@@ -84,7 +86,7 @@ def find_keyboards(picture: NDArray[np.float32]) -> list[Keyboard]:
 
 @dataclass(frozen=True)
 class _Zones:
-    """r of the far end of the keys, of the front of the black ones and of the white ones."""
+    """Coordinate r of the far end of the keys, and of the front of black and of white keys."""
 
     far: float
     black_front: float
@@ -92,6 +94,7 @@ class _Zones:
 
 
 def _find_zones(picture: NDArray[np.float32], lines: Lines) -> _Zones | None:
+    """Find the ends of the keys from the brightness on and between them, for each r."""
     height, width = picture.shape
     reach = np.hypot(height, width) / 2
     unit = abs(float(lines.width[0]))
@@ -99,7 +102,7 @@ def _find_zones(picture: NDArray[np.float32], lines: Lines) -> _Zones | None:
     first, last = int(lines.blacks[0]), int(lines.blacks[-1])
     low, high = np.floor(black_place(lines.blacks[[0, -1]]) / 7).astype(int)
     octaves = np.arange(low, high + 1)
-    # Between E and F and between B and C there is white from end to end.
+    # Between E and F and between B and C, the white keys are not covered by black ones.
     free = (np.array([2.72, 3.28, -0.28, 0.28]) + 7 * octaves[:, None]).ravel()
     black = black_place(np.arange(first, last + 1))
     white_level = _row_level(picture, lines, free, r)
@@ -113,7 +116,7 @@ def _find_zones(picture: NDArray[np.float32], lines: Lines) -> _Zones | None:
     if typical < 0.08:
         return None
     black_zone = _run(contrast > 0.5 * typical, np.flatnonzero(inside))
-    # White keys go on beyond the black ones on the player's side only, with a dark line at every
+    # White keys extend beyond the black ones on the player's side only, with a dark line at every
     # edge.
     edges = np.arange(7 * low, 7 * (high + 1) + 1).astype(np.float64)
     middles = edges[:-1] + 0.5
@@ -126,14 +129,14 @@ def _find_zones(picture: NDArray[np.float32], lines: Lines) -> _Zones | None:
         if len(near) < 3:
             continue
         level = np.nan_to_num(white_level[near])
-        worth = float(np.median(level)) / bright + 4 * float(np.nanmedian(lined[near]))
-        if np.isfinite(worth) and (best is None or worth > best[0]):
-            best = worth, side
+        evidence = float(np.median(level)) / bright + 4 * float(np.nanmedian(lined[near]))
+        if np.isfinite(evidence) and (best is None or evidence > best[0]):
+            best = evidence, side
     if best is None or best[0] < 0.4:
         return None
     side = best[1]
     black_front, far = (black_zone[1], black_zone[0]) if side == 1 else black_zone
-    # The white keys end where brightness, or their lines, change most.
+    # The white keys end where their brightness changes most.
     ends = black_front + side * np.arange(round(0.35 * length), round(0.95 * length) + 1)
     ends = ends[(ends >= 2) & (ends < len(r) - 2)]
     if len(ends) < 3:
@@ -142,7 +145,7 @@ def _find_zones(picture: NDArray[np.float32], lines: Lines) -> _Zones | None:
     drop = np.abs(level[ends - 2] - level[ends + 2])
     front = int(ends[int(np.argmax(drop))])
     if drop.max() < 0.08:
-        # No visible end, for it may lie outside the picture: as long as keys are.
+        # The end is not visible and may be outside the picture; the usual proportions are taken.
         front = int(np.clip(black_front + side * 0.6 * length, 0, len(r) - 1))
     return _Zones(float(r[far]), float(r[black_front]), float(r[front]))
 
@@ -153,7 +156,7 @@ def _row_level(
     u: NDArray[np.float64],
     r: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """(R,) median brightness at places u, for each r; NaN outside the picture."""
+    """(R,) Median brightness at coordinates u, for each r; NaN outside the picture."""
     values = sample(picture, lines.pixels(u[None, :], np.repeat(r[:, None], len(u), axis=1)))
     level = np.full(len(r), np.nan)
     enough = np.isfinite(values).sum(axis=1) >= max(2, len(u) // 4)
@@ -174,7 +177,7 @@ def _run(good: NDArray[np.bool_], start: NDArray[np.int64]) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class _Naming:
-    """Which key is which: white key edge n of the keyboard is at u = (n - first) * direction."""
+    """An assignment of keys: edge n of the white keys is at u = (n - first) * direction."""
 
     first: float
     direction: int
@@ -184,19 +187,19 @@ class _Naming:
 def _namings(
     picture: NDArray[np.float32], lines: Lines, zones: _Zones, flipped: bool
 ) -> list[_Naming]:
-    """Every way to count octaves, with what speaks against it, the best within 1."""
+    """The assignments for all octaves whose doubt is at most 1 more than the least."""
     model = _black_edges()
     found = np.asarray(black_place(lines.blacks))
     height, width = picture.shape
     row = (zones.far + zones.black_front) / 2
     ways = []
     for octave in range(-12, 13):
-        # u = 0 is the left edge of some C; in a mirror u = 3 is, counted to the left.
+        # u = 0 is the left edge of some C; in a mirrored picture u = 3, counted to the left.
         direction = -1 if flipped else 1
         first = _C1 + 7.0 * octave + (3.0 if flipped else 0.0)
         n = first + direction * found
-        # Black keys found where the keyboard has none, and those that it has, within the picture
-        # and within what was found or well beside it, that were not found.
+        # Doubtful are black keys found where the keyboard has none, and black keys of the keyboard
+        # inside the picture that were not found.
         nearest = np.abs(n[:, None] - model[None]).min(axis=1)
         strange = int((nearest > 0.4).sum())
         u = (model - first) * direction
@@ -207,7 +210,7 @@ def _namings(
         )
         missed = visible & (np.abs(u[:, None] - found[None]).min(axis=1) > 0.4)
         doubt = strange + float(missed.sum())
-        # All else being equal, the middle of the picture is near the middle of the keyboard.
+        # Of equally doubtful octaves, the one nearest to the middle of the keyboard is likeliest.
         centre = float(np.mean(n))
         ways.append(_Naming(first, direction, doubt + abs(centre - 26) / 100))
     best = min(way.doubt for way in ways)
@@ -215,11 +218,12 @@ def _namings(
 
 
 def _black_edges() -> NDArray[np.float64]:
-    """(36,) where the black keys lie, in white keys from the left edge of the lowest key."""
+    """(36,) Positions of the black keys, in white keys from the left edge of the lowest key."""
     return np.asarray((key_centres()[BLACK, 1] - LEFT_EDGE) / WHITE_WIDTH)
 
 
 def _rough_plane(lines: Lines, zones: _Zones, naming: _Naming) -> Plane:
+    """The plane through the outermost black keys found, at the three ends of the keys."""
     u = np.array(black_place(lines.blacks[[0, -1]]))
     pixels, world = [], []
     for r, x in ((zones.far, FAR), (zones.black_front, BLACK_FRONT), (zones.front, FRONT)):

@@ -1,8 +1,8 @@
-"""Finding a keyboard in a picture by the pattern of its black keys.
+"""Detection of a keyboard in a picture by the pattern of its black keys.
 
-Lines are laid across the picture at several angles. Where one crosses black keys, the dark
-stretches on it come in groups of two and three, which gives the keyboard's scale and the place of
-every C. Many such lines side by side are a keyboard.
+Lines are laid across the picture at several angles. Where a line crosses black keys, the dark
+segments on it come in groups of two and three, which determines the width of the keys and the
+position of every C. Many such lines side by side are a keyboard.
 """
 
 from __future__ import annotations
@@ -14,39 +14,45 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, maximum_filter1d, minimum_filter1d, uniform_filter1d
 
-# Where the black keys of an octave lie, in widths of a white key from the left edge of C. Makers
-# differ by a tenth either way, and simulated ones sit right on the edges of white keys.
+# Positions of the black keys of an octave, in widths of a white key from the left edge of C. Pianos
+# differ by a tenth either way; simulated black keys are exactly on the edges of white keys.
 _BLACK_AT = np.array([0.94, 2.06, 3.92, 5.0, 6.08])
 _OFF = 0.22
-"""How far off a black key may be found [white keys]."""
+"""[white keys] Greatest distance of a black key from its position."""
 _WIDTHS = (0.25, 0.85)
-"""How wide one may look [white keys]."""
+"""[white keys] Range of the width of a black key."""
 _CONTRAST = 0.12
-"""Between black and white, at least, on a scale of 0 to 1."""
+"""Least difference of the brightness of black and white keys, 0..1."""
 _FEWEST = 5
-"""Black keys on a line."""
+"""Least number of black keys on a line."""
 _NARROWEST = 5
-"""White keys [pixels]."""
+"""[pixels] Least width of a white key."""
 _GUESSES = 8
+"""Hypotheses about a line that are refined."""
 _LINES = 150
+"""Lines at each angle."""
 _ANGLES = np.radians(np.arange(-10, 11, 2.0))
+"""[rad] Angles of the lines with the horizontal, and with the vertical."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Where the black keys are, along lines across the picture.
+    """A keyboard found along lines across the picture.
 
-    A place (s, r) is `origin + s * along + r * across` [pixels]; white key edges lie at
-    s = start(r) + width(r) * u for whole u, and u = 0, 7, 14 ... are left edges of a C (or, if
-    seen in a mirror, 3 - u).
+    Coordinates (s, r) are at `origin + s * along + r * across` [pixels]. Edges of white keys are
+    at s = start(r) + width(r) * u for integers u, and u = 0, 7, 14 ... are the left edges of a C
+    (in a mirrored picture, 3 - u).
 
     Attributes:
-        origin, along, across: (2,) column, row.
-        start, width: (2,) coefficients (at r = 0, per r) [pixels].
+        origin: (2,) column, row of s = r = 0 [pixels].
+        along: (2,) unit vector along the lines.
+        across: (2,) unit vector from line to line.
+        start: (2,) value at r = 0 and slope of start(r) [pixels].
+        width: (2,) value at r = 0 and slope of width(r) [pixels].
         rows: first and last r that cross black keys [pixels].
-        blacks: numbers of the black keys found, counted from the black key at the right edge of
-            the C at u = 0, five to an octave.
-        score: how much speaks for it.
+        blacks: indices of the black keys found, five per octave; index 0 is the black key on the
+            right edge of the C at u = 0.
+        score: sum of the scores of the lines.
     """
 
     origin: NDArray[np.float64]
@@ -59,7 +65,7 @@ class Lines:
     score: float
 
     def pixels(self, u: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(..., 2) column, row of places along the keyboard and across it."""
+        """(..., 2) Column, row of coordinates u along the keyboard and r across it."""
         s = self.start[0] + self.start[1] * r + (self.width[0] + self.width[1] * r) * u
         places: NDArray[np.float64] = (
             self.origin + s[..., None] * self.along + r[..., None] * self.across
@@ -68,21 +74,33 @@ class Lines:
 
 
 def black_place(number: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Places u of black keys, by the number that `Lines.blacks` gives them."""
+    """Coordinates u of black keys, given their indices as in `Lines.blacks`."""
     return np.asarray(_BLACK_AT[number % 5] + 7 * (number // 5))
 
 
 def sample(picture: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Brightness at places (..., 2) column, row, measured from the picture's corner.
+    """Brightness at points of a picture, by linear interpolation.
 
-    Outside the picture it is NaN.
+    Args:
+        picture: (height, width).
+        places: (..., 2) column, row, measured from the outer corner of the top left pixel.
+
+    Returns:
+        (...) brightness; NaN outside the picture.
     """
     at = np.moveaxis(places[..., ::-1] - 0.5, -1, 0)
     return np.asarray(map_coordinates(picture, at, order=1, mode="constant", cval=np.nan))
 
 
 def find_lines(picture: NDArray[np.float32]) -> Lines | None:
-    """The keyboard in a grey picture (height, width), 0..1; None if there is none."""
+    """Find the keyboard in a picture.
+
+    Args:
+        picture: (height, width) brightness, 0..1.
+
+    Returns:
+        The lines with the highest score; None if there is no keyboard.
+    """
     best: Lines | None = None
     for turn, angle in product((0.0, np.pi / 2), _ANGLES):
         found = _at_angle(picture, turn + angle)
@@ -92,6 +110,7 @@ def find_lines(picture: NDArray[np.float32]) -> Lines | None:
 
 
 def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
+    """The keyboard on lines at one angle [rad]."""
     height, width = picture.shape
     along = np.array([np.cos(angle), np.sin(angle)])
     across = np.array([-along[1], along[0]])
@@ -112,7 +131,7 @@ def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
     if scores.max() < _FEWEST:
         return None
     good = scores >= max(_FEWEST, 0.6 * scores.max())
-    # The longest run of good lines that agree with the best of them, small holes allowed.
+    # The longest run of good lines that agree with the best one, with small gaps.
     middle = int(np.argmax(uniform_filter1d(scores * good, 5)))
     if fits[middle] is None or not good[middle]:
         middle = int(np.argmax(scores))
@@ -152,7 +171,14 @@ def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
 
 
 def line_through(r: NDArray[np.float64], value: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(2,) value at r = 0 and slope: the middle of the slopes of all pairs (Theil and Sen)."""
+    """(2,) Value at r = 0 and slope of a robust line, by the Theil-Sen estimator.
+
+    It is the median of the slopes of all pairs of points (Theil 1950, Sen 1968).
+
+    Args:
+        r: (N,) positions.
+        value: (N,) values at these positions.
+    """
     first, second = np.triu_indices(len(r), 1)
     slope = np.median((value[second] - value[first]) / (r[second] - r[first]))
     return np.array([np.median(value - slope * r), slope])
@@ -160,7 +186,7 @@ def line_through(r: NDArray[np.float64], value: NDArray[np.float64]) -> NDArray[
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """One line across the keyboard: u = (s - start) / width."""
+    """A line across the keyboard, on which u = (s - start) / width."""
 
     start: float
     width: float
@@ -168,7 +194,7 @@ class _Fit:
     score: float
 
     def like(self, other: _Fit) -> _Fit | None:
-        """The same, counted from the octave that another one is counted from."""
+        """The same fit with the octaves counted as in another one; None if they disagree."""
         if abs(self.width / other.width - 1) > 0.03:
             return None
         middle = other.start + other.width * float(black_place(other.blacks).mean())
@@ -185,7 +211,12 @@ class _Fit:
 
 
 def _fit(dark: NDArray[np.bool_], s: NDArray[np.float64]) -> _Fit | None:
-    """Explain the dark stretches (S,) on a line as black keys."""
+    """Explain the dark segments of a line as black keys.
+
+    Args:
+        dark: (S,) bool, dark pixels.
+        s: (S,) their coordinates along the line [pixels].
+    """
     edges = np.flatnonzero(np.diff(dark, prepend=False, append=False))
     begin, end = edges[::2], edges[1::2]
     centre = s[0] + (begin + end - 1) / 2
@@ -197,8 +228,9 @@ def _fit(dark: NDArray[np.bool_], s: NDArray[np.float64]) -> _Fit | None:
     centre, length = centre[broad], length[broad]
     if len(centre) < _FEWEST:
         return None
-    # Two stretches, five black keys and so an octave apart, taken as each of five kinds, give scale
-    # and place. Where some between them are hidden, they are fewer.
+    # Two segments that are five black keys, and so an octave, apart determine width and start, for
+    # each of the five black keys that they may be. Where some between them are hidden, they are
+    # fewer apart.
     guesses = []
     for step in (5, 4, 3):
         if len(centre) <= step:
@@ -227,7 +259,7 @@ def _least_squares(
     number: NDArray[np.int64],
     fits: NDArray[np.bool_],
 ) -> _Fit | None:
-    """The line through stretches that fit, those that then fit too included, and so on."""
+    """Refine a fit by least squares, each time with the segments that fit then."""
     best: _Fit | None = None
     for _ in range(3):
         if fits.sum() < _FEWEST:
@@ -248,7 +280,18 @@ def _judge(
     start: NDArray[np.float64],
     width: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
-    """Score (H,) of H hypotheses, and which black key each of N stretches is (H, N), if any."""
+    """Compare H hypotheses about start and width with the N dark segments of a line.
+
+    Args:
+        centre: (N,) centres of the segments [pixels].
+        length: (N,) their lengths [pixels].
+        start: (H,) [pixels].
+        width: (H,) [pixels].
+
+    Returns:
+        (H,) scores, (H, N) index of the black key nearest to each segment, and (H, N) bool,
+        whether the segment fits it.
+    """
     u = (centre[None] - start[:, None]) / width[:, None]
     octave = np.floor(u / 7)
     off = np.abs((u - 7 * octave)[..., None] - _BLACK_AT)

@@ -1,4 +1,4 @@
-"""A web page, served on this machine only, on which a person clicks points of the keyboard."""
+"""Web page, served to this machine only, on which a person clicks points of the keyboard."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from pianomime.video.film.film import Film
 from pianomime.video.keyboard.points import SUGGESTED, parse_points
 
 _FRAMES = 15
+"""Pictures whose median the page shows."""
 _LAST_PORT = 65535
 _LONGEST = 100_000
-"""Bytes of an answer."""
-_PATIENCE = 2.0
-"""[s] for which a browser that has connected may say nothing: others wait so long."""
+"""[bytes] Largest request."""
+_TIMEOUT = 2.0
+"""[s] Longest silence of a browser that has connected; other requests wait so long."""
 
 _PAGE = Template("""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>Where is the keyboard?</title><style>
@@ -33,18 +34,18 @@ body { margin: 1rem; } #frame { position: relative; width: 100%; cursor: crossha
 #frame span { position: absolute; width: 9px; height: 9px; margin: -5px; border-radius: 50%;
   border: 2px solid #f33; pointer-events: none; }
 li.now { font-weight: bold; } li.done { opacity: .6; } button { font: inherit; }
-#told { min-height: 1.5em; }
+#message { min-height: 1.5em; }
 </style></head><body>
-<p>Click the point in bold; a point that is not to be seen can be skipped. Front is the player's
-side, left the bass. Four points or more.</p>
+<p>Click the point in bold, or skip it if it is not visible. Front is toward the player, left is the
+bass. At least four points are needed.</p>
 <div id="frame"><img src="frame.png" alt="the video"></div>
 <ol id="names"></ol>
 <p><button id="skip">Skip</button> <button id="undo">Undo</button>
-<button id="save">Save</button></p><p id="told"></p>
+<button id="save">Save</button></p><p id="message"></p>
 <script>
 const names = $names, width = $width, height = $height;
 let points = {}, order = [], now = 0;
-const frame = document.getElementById("frame"), told = document.getElementById("told");
+const frame = document.getElementById("frame"), message = document.getElementById("message");
 function show() {
   document.getElementById("names").innerHTML = names.map((name, i) =>
     `<li class="$${i == now ? "now" : i < now ? "done" : ""}">$${name}` +
@@ -69,7 +70,7 @@ document.getElementById("undo").onclick = () => {
   now = Math.max(now - 1, 0); delete points[names[now]]; show(); };
 document.getElementById("save").onclick = async () => {
   const answer = await fetch("points", {method: "POST", body: JSON.stringify({points})});
-  told.textContent = await answer.text();
+  message.textContent = await answer.text();
 };
 show();
 </script></body></html>
@@ -80,37 +81,38 @@ class PickPage:
     """Serves the page. Use it as a context manager.
 
     Attributes:
-        url: where it is.
+        url: address of the page.
+        saved: how well the saved points fit, in one line; empty until some are saved.
     """
 
     def __init__(self, film: Film, out: Path, port: int = 0) -> None:
-        """Begin to serve.
+        """Start the server.
 
         Args:
             film: the video.
             out: JSON file to write, see `pianomime.video.keyboard.points`.
-            port: 0 for any free one.
+            port: port of the server; 0 for any free one.
 
         Raises:
-            InputError: no such port, or no picture in the video can be read.
-            OSError: the port is taken.
+            InputError: there is no such port, or no picture in the video can be read.
+            OSError: the port is in use.
         """
         if not 0 <= port <= _LAST_PORT:
             raise InputError(f"a port is a number from 0 to {_LAST_PORT}, not {port}")
         pictures = film.sample(_FRAMES)
         if not pictures:
             raise InputError(f"{film.path}: no picture in it can be read")
-        # The middle of all, so that hands hide less.
+        # The median removes most of the hands.
         picture = np.median(np.stack(pictures), axis=0).astype(np.uint8)
         file = io.BytesIO()
         Image.fromarray(picture).save(file, "png")
         page = _PAGE.substitute(names=json.dumps(SUGGESTED), width=film.width, height=film.height)
-        self.told = ""
+        self.saved = ""
         contents = {"/": ("text/html", page.encode()), "/frame.png": ("image/png", file.getvalue())}
         owner = self
 
         class Handler(BaseHTTPRequestHandler):
-            timeout = _PATIENCE
+            timeout = _TIMEOUT
 
             def do_GET(self) -> None:
                 if self.path in contents:
@@ -124,12 +126,12 @@ class PickPage:
                     self._answer(404, "text/plain", b"nothing here")
                     return
                 try:
-                    told = _save(self.rfile.read(length), out)
+                    saved = _save(self.rfile.read(length), out)
                 except InputError as error:
                     self._answer(400, "text/plain", str(error).encode())
                     return
-                self._answer(200, "text/plain", f"Saved: {told}. You can close this.".encode())
-                owner.told = told
+                self._answer(200, "text/plain", f"Saved: {saved}. You can close this.".encode())
+                owner.saved = saved
 
             def _answer(self, code: int, kind: str, content: bytes) -> None:
                 self.send_response(code)
@@ -156,22 +158,23 @@ class PickPage:
         self._server.server_close()
 
     def wait(self) -> str:
-        """Answer the browser until points are saved that tell where the keyboard is.
+        """Answer requests until points are saved that determine where the keyboard is.
 
         Returns:
-            How well they do, in one line.
+            How well they fit, in one line.
         """
-        while not self.told:
+        while not self.saved:
             self._server.handle_request()
-        return self.told
+        return self.saved
 
 
 def _save(answer: bytes, out: Path) -> str:
+    """Check and write the points that a browser has sent."""
     try:
         text = json.dumps(json.loads(answer), indent=2) + "\n"
     except ValueError as error:
         raise InputError("the points did not arrive as JSON") from error
-    told = parse_points(text, out).describe()
+    saved = parse_points(text, out).describe()
     with atomic(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    return told
+    return saved

@@ -1,4 +1,4 @@
-"""From the picture to the keyboard's plane and back: a homography, and how to fit one."""
+"""The plane of the keyboard in a picture: a homography, and fits of one."""
 
 from __future__ import annotations
 
@@ -7,30 +7,33 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+_TRIALS = 500
+"""Random samples of four points in a robust fit."""
+
 
 @dataclass(frozen=True, eq=False)
 class Plane:
     """The plane of the keys' tops as a camera sees it.
 
     Attributes:
-        matrix: (3, 3) homography from pixels (column, row, 1), measured from the outer corner of
-            the top left pixel, to world (x, y, 1) [m], up to scale.
+        matrix: (3, 3) homography, up to scale, from pixels (column, row, 1), measured from the
+            outer corner of the top left pixel, to world (x, y, 1) [m].
     """
 
     matrix: NDArray[np.float64]
 
     def to_world(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """World x, y [m] of pixels (..., 2)."""
+        """(..., 2) World x, y [m] of pixels (..., 2), column and row."""
         return _apply(self.matrix, np.asarray(pixels, np.float64))
 
     def to_pixels(self, world: ArrayLike) -> NDArray[np.float64]:
-        """Pixels (column, row) of world x, y (..., 2) [m]."""
+        """(..., 2) Column and row of world x, y (..., 2) [m]."""
         return _apply(
             np.asarray(np.linalg.inv(self.matrix), np.float64), np.asarray(world, np.float64)
         )
 
     def zoomed(self, factor: float) -> Plane:
-        """The plane of the same picture drawn `factor` times as large."""
+        """The plane of the same picture at `factor` times its size."""
         return Plane(self.matrix @ np.diag([1 / factor, 1 / factor, 1.0]))
 
 
@@ -41,10 +44,10 @@ def _apply(matrix: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[
 
 
 def fit_plane(pixels: ArrayLike, world: ArrayLike) -> Plane:
-    """The plane that maps pixels to world points best, by least squares (normalized DLT).
+    """Fit a plane by the normalized direct linear transform (Hartley and Zisserman, section 4.4).
 
     Args:
-        pixels: (N, 2) column, row; N is 4 or more, no three in a line.
+        pixels: (N, 2) column, row of at least 4 points, no three of them in a line.
         world: (N, 2) x, y [m].
 
     Raises:
@@ -52,7 +55,7 @@ def fit_plane(pixels: ArrayLike, world: ArrayLike) -> Plane:
     """
     seen, known = np.asarray(pixels, np.float64), np.asarray(world, np.float64)
     if len(seen) < 4:
-        raise ValueError("4 points at least are needed")
+        raise ValueError("at least 4 points are needed")
     shift_seen, shift_known = _normalizer(seen), _normalizer(known)
     u = _apply(shift_seen, seen)
     x = _apply(shift_known, known)
@@ -74,15 +77,15 @@ def fit_plane(pixels: ArrayLike, world: ArrayLike) -> Plane:
 def fit_plane_robustly(
     pixels: ArrayLike, world: ArrayLike, tolerance: float = 0.008
 ) -> tuple[Plane, NDArray[np.bool_]]:
-    """Like `fit_plane`, but leaving out points that do not agree with the others.
+    """Fit a plane without points that do not agree with the others, by RANSAC.
 
     Args:
         pixels: (N, 2) column, row.
         world: (N, 2) x, y [m].
-        tolerance: how far off a point may be [m].
+        tolerance: greatest error of a point that agrees [m].
 
     Returns:
-        The plane, and (N,) which points agree with it.
+        The plane, and (N,) bool, the points that agree with it.
 
     Raises:
         ValueError: the points do not determine a plane.
@@ -91,9 +94,9 @@ def fit_plane_robustly(
     plane = fit_plane(seen, known)
     good = _error(plane, seen, known) < tolerance
     if len(seen) > 4 and not good.all():
-        draw = np.random.default_rng(0)
-        for _ in range(500):
-            four = draw.choice(len(seen), 4, replace=False)
+        rng = np.random.default_rng(0)
+        for _ in range(_TRIALS):
+            four = rng.choice(len(seen), 4, replace=False)
             try:
                 candidate = fit_plane(seen[four], known[four])
             except (ValueError, np.linalg.LinAlgError):
@@ -109,13 +112,14 @@ def fit_plane_robustly(
 def _error(
     plane: Plane, seen: NDArray[np.float64], known: NDArray[np.float64]
 ) -> NDArray[np.float64]:
+    """(N,) Distance of seen pixels from known world points [m]."""
     distance: NDArray[np.float64] = np.linalg.norm(plane.to_world(seen) - known, axis=1)
-    # Of three points in a line and one other, the inverse of the fit maps some to infinity.
+    # A plane fitted to three points in a line and one other maps some points to infinity.
     return np.where(np.isfinite(distance), distance, np.inf)
 
 
 def _normalizer(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The similarity that centres points and makes their mean distance the square root of 2."""
+    """(3, 3) Similarity that centres points, and scales their mean distance to sqrt(2)."""
     centre = points.mean(axis=0)
     spread = np.linalg.norm(points - centre, axis=1).mean()
     if spread == 0:

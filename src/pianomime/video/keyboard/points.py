@@ -1,8 +1,8 @@
-"""Points of the keyboard that a person has named: a JSON file.
+"""Named points of the keyboard in a video, in a JSON file that a person has made.
 
-It holds one object, `{"points": {NAME: [COLUMN, ROW], ...}}`, in pixels of the video. A name is a
-key and one of its corners: "A0 front left", "C4 back right"; a black key also has the middle of
-its front edge, "F#3 front". Front is the player's side, left the bass.
+The file holds one object, `{"points": {NAME: [COLUMN, ROW], ...}}`, in pixels of the video. A name
+is a key and one of its corners, such as "A0 front left" or "C4 back right", or the middle of the
+front edge of a black key, such as "F#3 front". Front is toward the player, left is the bass.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.errors import InputError
+from pianomime.errors import InputError, UnknownNameError, closest
 from pianomime.keyboard import BLACK, KEYS, key_name
 from pianomime.video.keyboard.geometry import FAR, FRONT, LEFT_EDGE, WHITE_WIDTH
 from pianomime.video.keyboard.plane import Plane, fit_plane_robustly
 from pianomime.world.parameters import key_centres, key_half_sizes
 
-# People type these names: a sharp is the sign that keyboards have.
+# In names that people type, a sharp is written as "#".
 _KEY_OF_NAME = {key_name(key).replace("♯", "#"): key for key in range(KEYS)}
 _NAME = re.compile(r"([A-G]#?\d) (front|back)(?: (left|right))?")
 
@@ -35,18 +35,18 @@ SUGGESTED = (
     "F#2 front",
     "F#6 front",
 )
-"""Eight points that are easy to see and far apart, as in the paper."""
+"""Names of eight points that are easy to see and far apart, as in the paper."""
 
 
 @dataclass(frozen=True, eq=False)
 class NamedPoints:
-    """The plane that named points tell.
+    """A plane fitted to named points.
 
     Attributes:
-        plane: from the video's pixels to the world.
-        names: of the points that agree with it.
-        left_out: of the others.
-        error_metres: median distance of the former from where the plane has them.
+        plane: plane of the keyboard in the video.
+        names: names of the points that agree with it.
+        left_out: names of the others.
+        error_metres: median error of the points that agree [m].
     """
 
     plane: Plane
@@ -55,22 +55,26 @@ class NamedPoints:
     error_metres: float
 
     def describe(self) -> str:
-        """One line for a person."""
+        """One line for the user."""
         wrong = f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
         return f"{len(self.names)} points, within {self.error_metres * 1000:.1f} mm{wrong}"
 
 
 def place_of(name: str) -> NDArray[np.float64]:
-    """World x, y [m] of a named point.
+    """(2,) World x, y of a named point [m].
+
+    Args:
+        name: name of a point, such as "C4 front left".
 
     Raises:
-        InputError: there is no such point.
+        UnknownNameError: there is no such point.
     """
     match = _NAME.fullmatch(name.strip())
     key = None if match is None else _KEY_OF_NAME.get(match[1])
     if match is None or key is None or (match[3] is None and not BLACK[key]):
-        raise InputError(
-            f"{name!r} is no point of a keyboard; points are called like {SUGGESTED[0]!r} or "
+        hint = closest(name, SUGGESTED) or ";"
+        raise UnknownNameError(
+            f"{name!r} is not a point of a keyboard{hint} names are like {SUGGESTED[0]!r} or "
             f"{SUGGESTED[-1]!r}"
         )
     centre, half = key_centres()[key], key_half_sizes()[key]
@@ -78,16 +82,19 @@ def place_of(name: str) -> NDArray[np.float64]:
     if BLACK[key]:
         x = centre[0] + half[0] if match[2] == "front" else FAR
         return np.array([x, centre[1] + side * half[1]])
-    # The middle of the gap between keys, which is what one sees.
+    # The middle of the gap between white keys, which is what one sees.
     white = int((~BLACK[:key]).sum()) + (side + 1) / 2
     return np.array([FRONT if match[2] == "front" else FAR, LEFT_EDGE + WHITE_WIDTH * white])
 
 
 def read_points(path: Path) -> NamedPoints:
-    """The plane of a file of named points; those that disagree with the others are left out.
+    """Read a file of named points, and fit a plane to those that agree.
+
+    Args:
+        path: the JSON file.
 
     Raises:
-        InputError: no such file, or one that does not hold four points or more, well apart.
+        InputError: the file cannot be read, or does not hold at least four points, well apart.
     """
     try:
         text = path.read_text("utf-8")
@@ -99,14 +106,14 @@ def read_points(path: Path) -> NamedPoints:
 
 
 def parse_points(text: str, path: Path) -> NamedPoints:
-    """The same of the text of a file.
+    """Fit a plane to the named points in a text.
 
     Args:
-        text: JSON.
-        path: of the file, for messages.
+        text: content of a file of named points.
+        path: the file, for messages.
 
     Raises:
-        InputError: it does not hold four points or more, well apart.
+        InputError: it does not hold at least four points, well apart.
     """
     try:
         content = json.loads(text)
@@ -116,13 +123,13 @@ def parse_points(text: str, path: Path) -> NamedPoints:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f'{path}: must hold {{"points": {{NAME: [COLUMN, ROW], ...}}}}') from error
     if len(names) < 4 or not np.isfinite(pixels).all():
-        raise InputError(f"{path}: 4 points at least are needed, of numbers")
+        raise InputError(f"{path}: at least 4 points of two finite numbers are needed")
     world = np.array([place_of(name) for name in names])
     try:
         plane, good = fit_plane_robustly(pixels, world)
     except (ValueError, np.linalg.LinAlgError) as error:
         raise InputError(
-            f"{path}: the points do not tell where the keyboard is: {error}"
+            f"{path}: the points do not determine where the keyboard is: {error}"
         ) from error
     off = np.linalg.norm(plane.to_world(pixels) - world, axis=1)
     return NamedPoints(

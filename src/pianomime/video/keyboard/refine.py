@@ -28,9 +28,17 @@ _OFF_LINE = 0.003
 def refine(
     picture: NDArray[np.float32], plane: Plane
 ) -> tuple[Plane, NDArray[np.bool_], float, float] | None:
-    """Fit the plane to the edges of keys, found to a fraction of a pixel near where it has them.
+    """Fit a plane to the edges of keys that are found near those that it predicts.
 
-    An edge says where it is across itself, nothing of where along.
+    An edge determines only the coordinate perpendicular to it.
+
+    Args:
+        picture: (height, width) brightness, 0..1.
+        plane: a first guess.
+
+    Returns:
+        The plane, (88,) bool the keys with edges, and the median error [m] and [pixels]; None if
+        too few edges are found.
     """
     seen = np.zeros(KEYS, bool)
     for window in (0.4, 0.25, 0.2):
@@ -45,7 +53,7 @@ def refine(
 
         scale = plane.matrix / plane.matrix[2, 2]
         start = scale.ravel()[:8]
-        # The columns differ by orders of magnitude.
+        # The parameters differ by orders of magnitude, hence x_scale.
         solution = least_squares(residual, start, loss="soft_l1", x_scale="jac", max_nfev=60)
         if not np.isfinite(solution.x).all():
             return None
@@ -65,14 +73,14 @@ def refine(
 
 @dataclass(frozen=True, eq=False)
 class _Edges:
-    """Places (E, 2) where the picture shows an edge whose world x (axis 0) or y (axis 1) is known.
+    """E points on edges in the picture, of each of which one world coordinate is known.
 
     Attributes:
         pixels: (E, 2) column, row.
-        axis: (E,) int.
-        value: (E,) [m].
-        weight: (E,).
-        seen: (88,) keys with an edge.
+        axis: (E,) int; 0 if world x is known, 1 if world y is.
+        value: (E,) that coordinate [m].
+        weight: (E,) weight of its error.
+        seen: (88,) bool, keys with an edge.
     """
 
     pixels: NDArray[np.float64]
@@ -83,7 +91,7 @@ class _Edges:
 
 
 def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _Edges:
-    """Look for edges within `window` white keys of where a plane has them."""
+    """Find edges of keys within `window` widths of a white key from those that a plane predicts."""
     pixels, axis, value, weight = [], [], [], []
     seen = np.zeros(KEYS, bool)
     span = np.linspace(-window, window, 33) * WHITE_WIDTH
@@ -101,7 +109,7 @@ def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _E
     weight.append(np.full(good.sum(), 1.0))
     found = np.bincount(gap[good], minlength=len(whites)) >= 2
     seen[WHITES[:-1][found]] = seen[WHITES[1:][found]] = True
-    # Ends: of black keys toward the player, of white keys toward the player and away.
+    # Ends of black keys toward the player, and of white keys toward and away from the player.
     free = np.array(
         [
             y
@@ -112,12 +120,13 @@ def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _E
     )
     blacks = key_centres()[BLACK, 1]
     centres = key_centres()[WHITES, 1]
-    # Wide, and of less weight, for black keys are longer on most pianos than on the world's.
+    # In a wide window and with less weight, since black keys of most pianos are longer than those
+    # of the world.
     reach = np.linspace(-0.013, 0.013, 53)
     for x, along, sign, trust in (
         (BLACK_FRONT, blacks, 1, 0.23),
         (FRONT, centres, -1, 0.33),
-        # Lids and glow make the far end doubtful.
+        # Lids and glow make the far end uncertain.
         (FAR, free, 1, 0.23),
     ):
         world = np.stack(np.broadcast_arrays(x + reach, along[:, None]), axis=-1)
@@ -125,7 +134,7 @@ def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _E
         place, height = _step(sign * profile, reach)
         good = height > 0.06
         if good.sum() > 3:
-            # The edges of all keys are in one line; what is not is a shelf or a shadow.
+            # The edges of all keys are on one line; edges off that line are of a shelf or a shadow.
             at, slope = line_through(along[good], place[good])
             good &= np.abs(place - at - slope * along) < _OFF_LINE
         pixels.append(plane.to_pixels(np.stack([x + place[good], along[good]], axis=-1)))
@@ -146,7 +155,7 @@ def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _E
 def _dip(
     profile: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where each profile (P, S) is darkest, between samples, and how deep the dip is."""
+    """(P,) Position of the minimum of each brightness profile (P, S), and its depth."""
     complete = np.asarray(np.isfinite(profile).all(axis=1))
     filled = np.where(complete[:, None], profile, 0.0)
     lowest = np.clip(filled.argmin(axis=1), 1, len(at) - 2)
@@ -154,7 +163,7 @@ def _dip(
     third = len(at) // 3
     shoulder = np.minimum(filled[:, :third].max(axis=1), filled[:, -third:].max(axis=1))
     depth = np.where(complete, shoulder - filled.min(axis=1), 0.0)
-    # A dip at the very end belongs to something else.
+    # A minimum at the very end belongs to something else.
     inner = (lowest > 2) & (lowest < len(at) - 3)
     return place, np.where(inner, depth, 0.0)
 
@@ -162,7 +171,7 @@ def _dip(
 def _step(
     profile: NDArray[np.float64], at: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where each profile (P, S) rises most, between samples, and by how much."""
+    """(P,) Position of the steepest rise of each brightness profile (P, S), and its height."""
     complete = np.asarray(np.isfinite(profile).all(axis=1))
     filled = np.where(complete[:, None], profile, 0.0)
     wide = max(2, len(at) // 12)
@@ -175,7 +184,7 @@ def _step(
 
 
 def _vertex(profile: NDArray[np.float64], lowest: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Offset (P,) of the minimum of the parabola through three samples, in samples."""
+    """(P,) Offset of the minimum of the parabola through three samples, in samples."""
     row = np.arange(len(profile))
     before, here, after = (profile[row, lowest + step] for step in (-1, 0, 1))
     curve = before - 2 * here + after

@@ -1,4 +1,8 @@
-"""Which finger played each note: decided over the whole piece from where the fingers were."""
+"""Fingering of a video: the finger that played each note, by a beam search over the whole piece.
+
+The cost of a fingering is how far its fingers are from their keys, plus what makes it unlikely: a
+finger on two notes at once, or fingers of one hand out of order.
+"""
 
 from __future__ import annotations
 
@@ -9,40 +13,42 @@ from numpy.typing import NDArray
 
 from pianomime.music import Score
 from pianomime.video.notes.touch import misfit
+from pianomime.world.layout import FINGER_COUNT
 
-_FINGERS = 10
-"""0..4 left thumb to little finger, 5..9 right."""
+_FINGERS = 2 * FINGER_COUNT
+"""Fingers of both hands: 0..4 left thumb to little finger, 5..9 right."""
 _BEAM = 60
-"""Partial fingerings that are kept."""
+"""Number of partial fingerings kept."""
 _WORST = 20.0
-"""Misfit beyond which a finger is simply elsewhere."""
+"""Largest misfit of a finger; beyond it, the distance makes no difference."""
 _NOBODY = 25.0
-"""The same of a hand that was never seen: a little better than a hand that is seen elsewhere."""
+"""Misfit of the fingers of a hand that was never seen; at its worst, a seen finger has 1.3 times
+`_WORST`, which is a little more."""
 _STRIKE = 3
-"""Frames from the onset in which a finger must be on its key."""
+"""Frames from the onset on in which a finger must be on its key."""
 _HOLD = 0.3
-"""How much the rest of a note counts, compared with its onset."""
+"""Weight of the misfit in all frames of a note, relative to that at its onset."""
 _BUSY = 1.5
-"""Cost of lifting a finger off a note to play another one; the same again for every frame that
-the first note is cut short by, up to `_WORST`."""
+"""Cost of lifting a finger off a note to play another one."""
 _BUSY_FRAME = 0.3
+"""Cost of each frame by which that cuts the first note short; the sum is at most `_WORST`."""
 _CROSSED = 1.0
-"""Cost for fingers of one hand that do not lie in order along the keyboard."""
+"""Cost of two fingers of one hand out of order along the keyboard."""
 _THUMB_UNDER = 0.3
-"""The same where the thumb is one of them."""
+"""Cost of two fingers out of order if one of them is the thumb."""
 _ELSEWHERE = 9.0
-"""Misfit of a note beyond which its finger was guessed rather than seen: two keys away."""
+"""Misfit, that of a finger two keys away, beyond which the finger of a note is only a guess."""
 
 
 @dataclass(frozen=True, eq=False)
 class NoteFingers:
-    """Who plays the N notes of a score.
+    """The fingers that play the N notes of a score.
 
     Attributes:
         hand: (N,) int8; 0 left, 1 right.
         finger: (N,) int8; 0 thumb .. 4 little.
-        stop: (N,) first frame in which the finger has let go.
-        misfit: (N,) how badly the finger was seen to fit its key (`touch.misfit`).
+        stop: (N,) first frame in which the finger no longer presses.
+        misfit: (N,) misfit of the tracked finger and its key, see `touch.misfit`.
     """
 
     hand: NDArray[np.int8]
@@ -52,40 +58,40 @@ class NoteFingers:
 
     @property
     def guessed(self) -> NDArray[np.bool_]:
-        """(N,) notes whose finger was not seen on or beside the key."""
+        """(N,) bool: notes whose finger was not seen on or beside the key."""
         return self.misfit > _ELSEWHERE
 
 
 def find_note_fingers(
     score: Score, points: NDArray[np.floating], seen: NDArray[np.bool_]
 ) -> NoteFingers:
-    """The cheapest fingering: fingers near their keys, each on one key at a time, in order.
+    """Find the cheapest fingering of a score, given tracked hands.
 
-    A hand that was never seen gets, as a guess, those notes that no finger is anywhere near.
+    A hand that was never seen gets, as a guess, the notes that no finger is near.
 
     Args:
-        score: its times are those of the video.
-        points: (T, 2, 6, 2 or 3) world x, y and perhaps z [m]; T reaches to the end of the score.
-        seen: (2,) hands that were seen.
+        score: the notes, in the time of the video.
+        points: (T, 2, 6, 2) or (T, 2, 6, 3) world x, y and z [m], to the end of the score.
+        seen: (2,) bool, hands that were seen.
     """
     frames = score.note_frames()
     order = np.lexsort((score.key, frames[:, 0]))
     fit = _fits(score, points, frames)
-    fit[:, np.repeat(~seen, 5)] = _NOBODY
+    fit[:, np.repeat(~seen, FINGER_COUNT)] = _NOBODY
     cost = np.zeros(1)
     until = np.zeros((1, _FINGERS), np.int64)
     since = np.full((1, _FINGERS), -1)
     on_key = np.full((1, _FINGERS), -1)
-    # For each note and row of the beam the row and the finger before: in hours, bytes count.
+    # For each note and row of the beam, the row before and the finger, as bytes to save memory.
     parents, picks = np.zeros((2, len(score), _BEAM), np.uint8)
     finger = np.arange(_FINGERS)
-    hand = finger // 5
-    # Fingers that should lie toward the treble, and toward the bass, of each finger.
+    hand = finger // FINGER_COUNT
+    # Which fingers should be on the treble side, and which on the bass side, of each finger.
     outward = np.where(hand == 0, 4 - finger, finger - 5)
     same = hand[:, None] == hand[None]
     above = same & (outward[None] > outward[:, None])
     below = same & (outward[None] < outward[:, None])
-    thumbs = finger % 5 == 0
+    thumbs = finger % FINGER_COUNT == 0
     price = np.where(thumbs[:, None] | thumbs[None], _THUMB_UNDER, _CROSSED)
     for number, note in enumerate(order):
         first, end = frames[note]
@@ -96,7 +102,7 @@ def find_note_fingers(
         wrong_above = busy & (on_key < key)
         wrong_below = busy & (on_key > key)
         step = step + wrong_above @ (above * price).T + wrong_below @ (below * price).T
-        # No finger strikes two keys at once.
+        # A finger cannot strike two keys at once.
         step = step + np.where(since == first, _WORST, 0.0)
         total = cost[:, None] + step
         keep = min(_BEAM, total.size)
@@ -116,8 +122,8 @@ def find_note_fingers(
         row_now = int(parents[number, row_now])
     stop = _let_go(picked, frames, order)
     return NoteFingers(
-        (picked // 5).astype(np.int8),
-        (picked % 5).astype(np.int8),
+        (picked // FINGER_COUNT).astype(np.int8),
+        (picked % FINGER_COUNT).astype(np.int8),
         stop,
         fit[np.arange(len(score)), picked],
     )
@@ -126,10 +132,10 @@ def find_note_fingers(
 def _fits(
     score: Score, points: NDArray[np.floating], frames: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    """(N, 10) how badly each finger fits each note, at its onset and for as long as it lasts."""
+    """(N, 10) Misfit of each finger and each note, at its onset and while it lasts."""
     fit = np.empty((len(score), _FINGERS))
     for note, (first, end) in enumerate(frames.tolist()):
-        # A key that is struck again at the very end sounds only after the last frame.
+        # A key struck again at the very end is down only after the last frame.
         first = min(first, len(points) - 1)
         during = points[first : max(end, first + 1), :, 1:]
         off = np.minimum(misfit(during, score.key[note]), _WORST).reshape(-1, _FINGERS)
@@ -140,7 +146,7 @@ def _fits(
 def _let_go(
     picked: NDArray[np.int64], frames: NDArray[np.int64], order: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """(N,) where notes are cut short because their finger strikes another key."""
+    """(N,) Frame in which each note ends, at the latest when its finger strikes another key."""
     stop = frames[:, 1].copy()
     holds = np.full(_FINGERS, -1)
     for note in order:

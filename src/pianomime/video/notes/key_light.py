@@ -1,7 +1,7 @@
-"""What each key looks like from frame to frame: the colour of a few patches on it and above it.
+"""Colours of the keys from frame to frame, in a few patches on and above each key.
 
-Tutorials let keys light up, or bars fall onto them; a camera sees keys go down and their
-neighbours' sides come to light. Either shows in some of the patches.
+In tutorials keys light up, or bars fall onto them; in a recording keys go down, and the sides of
+their neighbours become visible. Both change the colour of some of the patches.
 """
 
 from __future__ import annotations
@@ -21,25 +21,33 @@ ZONES = {
     "far end": (-0.070, -0.055),
     "between the black keys": (-0.050, -0.040),
 }
-"""World x from and to [m] of the patches."""
+"""Name and range of world x of each patch of a key [m]."""
 LIT = range(2)
-"""Numbers of those zones in which keys light up, and which hands do not hide. In the others keys
-that go down change their shade, and hands come and go."""
+"""Indices of the zones in which keys light up and which hands do not hide. In the others the shade
+of a key changes when it goes down, but also when a hand is over it."""
 
 _SOME = 2000
-"""Frames."""
+"""Frames from which the usual look of the keys is taken."""
 _FEWEST = 20
-"""Frames without a finger near a key that tell what it looks like at rest."""
+"""Least number of frames without a finger near a key for its look at rest to be taken from them."""
 _NEAR = 0.05
-"""`touching` from which a finger is near a key: at about 15 mm from its middle."""
+"""`touching` from which a finger is near a key: about 15 mm from its middle."""
+_STRONG = 99.5
+"""Percentile of all changes that counts as a glow of 1."""
 _HALF_WIDTH = np.where(BLACK, 0.004, 0.006)
+"""(88,) [m] Half the width of each key's patches."""
 
 
 class KeyLight:
-    """Reads the patches of all keys in pictures taken from one place."""
+    """Reads the patches of all keys in pictures of a camera that does not move."""
 
     def __init__(self, plane: Plane, size: tuple[int, int]) -> None:
-        """Prepare for pictures of a size (width, height), of which `plane` is the plane."""
+        """Find the pixels of all patches.
+
+        Args:
+            plane: plane of the keyboard in the pictures.
+            size: width and height of the pictures [pixels].
+        """
         along = np.array([np.linspace(*zone, 4) for zone in ZONES.values()])
         beside = np.linspace(-1, 1, 3)[None, :] * _HALF_WIDTH[:, None] + key_centres()[:, 1:2]
         world = np.stack(
@@ -51,61 +59,73 @@ class KeyLight:
         self._inside = inside
 
     def read(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """(zones, 88, 3) mean colour of each patch; black outside the picture."""
+        """Mean colour of each patch.
+
+        Args:
+            picture: (height, width, 3) uint8.
+
+        Returns:
+            (zones, 88, 3) uint8; black outside the picture.
+        """
         patches = picture[self._row, self._column].mean(axis=2)
         return np.where(self._inside[..., None], patches, 0).astype(np.uint8)
 
 
 def unattended(tracks: HandTracks) -> NDArray[np.bool_]:
-    """(S, 88) whether no finger is near a key, in the frames that tell what is usual."""
+    """(S, 88) bool: keys without a finger near them, in the frames that show their usual look."""
     points = tracks.seen_points(_step(len(tracks)))
     return np.stack([touching(points, key) < _NEAR for key in range(KEYS)], axis=1)
 
 
 def _step(frames: int) -> int:
-    """Of so many frames every how manieth tells what is usual."""
+    """Distance between the frames, of so many, that show the usual look of the keys."""
     return max(1, frames // _SOME)
 
 
 class Glow:
-    """How much the keys stand out from their usual look in one zone, a key at a time.
+    """Change of the keys from their usual look in one zone; about 0..1.
 
-    A key at a time, because of hours of video all keys at once would fill the memory.
+    It is read one key at a time, because all keys in hours of video would exceed the memory.
     """
 
     def __init__(
         self, light: LightRecord, away: NDArray[np.bool_], zone: int, colourful: bool
     ) -> None:
-        """Find out what is usual.
+        """Find the usual look of every key.
 
         Args:
-            light: what `KeyLight.read` gives for each frame.
-            away: what `unattended` tells of the same frames.
-            zone: which of `ZONES`.
-            colourful: go by how colourful a patch is, rather than by any change of colour.
+            light: colours of the keys in each frame, see `KeyLight`.
+            away: (S, 88) keys without a finger, as `unattended` returns them.
+            zone: index of a zone in `ZONES`.
+            colourful: measure the increase in saturation, instead of any change of colour.
         """
         self._light = light
         self._zone = zone
         self._colourful = colourful
-        # Some frames will do to know what is usual, and what is strong.
+        # Some frames are enough for the usual look, and for the strength of changes.
         some = light.every(_step(len(light)), zone)
         self._usual = np.asarray(np.median(some, axis=0), np.float32)
-        # A key may be down for most of the film: at rest it is when no finger is near it.
+        # A key may be down for most of the video; without a finger near it, it is at rest.
         for key in range(KEYS):
             rest = some[away[:, key], key]
             if len(rest) >= _FEWEST:
                 self._usual[key] = np.median(rest, axis=0)
-        self._strong = max(float(np.percentile(self._change(some, self._usual), 99.5)), 5.0)
+        self._strong = max(float(np.percentile(self._change(some, self._usual), _STRONG)), 5.0)
 
     def of(self, key: int) -> NDArray[np.float32]:
-        """(T,) about 0..1."""
+        """(T,) Change of a key in every frame, about 0..1; 0 for keys that do not exist."""
         if not 0 <= key < KEYS:
             return np.zeros(len(self._light), np.float32)
         light = self._light.key(self._zone, key)
         return self._change(light, self._usual[key]) / np.float32(self._strong)
 
     def standing_out(self, key: int, share: float = 0.5) -> NDArray[np.float32]:
-        """(T,) glow less a share of the brighter neighbour's, for light spreads to neighbours."""
+        """(T,) Change of a key, less a share of its brighter neighbour's, since light spreads.
+
+        Args:
+            key: the key, 0..87.
+            share: share of the neighbour's change to subtract.
+        """
         beside = np.maximum(self.of(key - 1), self.of(key + 1))
         return np.asarray(self.of(key) - share * beside, np.float32)
 

@@ -1,4 +1,4 @@
-"""When in the video a MIDI file begins: where fingers, and lit keys, are where the notes are."""
+"""Offset of a MIDI file in a video, by correlation of its onsets with fingers and lit keys."""
 
 from __future__ import annotations
 
@@ -19,19 +19,21 @@ from pianomime.video.notes.key_light import LIT, Glow, unattended
 from pianomime.video.notes.touch import touching
 
 _MATCH = 0.7
-"""Share of notes with a finger on their key from which a MIDI file is taken to be the right one."""
+"""Least share of notes with a finger on their key for a MIDI file to be what is played."""
+_ABOVE_CHANCE = 0.15
+"""Least difference of that share from the one by chance."""
 _INSIDE = 0.5
-"""Share of the music, or of the video if that is shorter, that must fall together."""
+"""Least overlap of music and video, as a share of the shorter one."""
 
 
 @dataclass(frozen=True)
 class Offset:
-    """How a MIDI file lies on a video.
+    """Where a MIDI file lies in a video, and how well it fits.
 
     Attributes:
-        seconds: a note struck at t in the file is struck at t + seconds in the video.
+        seconds: a note at time t of the file is at t + seconds in the video [s].
         touched: share of the notes within the video that have a finger on their key.
-        by_chance: the same for the middling offset: how it would be for any song.
+        by_chance: median of that share over all offsets, as it would be for another song.
     """
 
     seconds: float
@@ -40,8 +42,8 @@ class Offset:
 
     @property
     def matches(self) -> bool:
-        """Whether the file seems to be what is played."""
-        return self.touched >= _MATCH and self.touched >= self.by_chance + 0.15
+        """Whether the file probably is what is played."""
+        return self.touched >= _MATCH and self.touched >= self.by_chance + _ABOVE_CHANCE
 
 
 def estimate_offset(
@@ -50,21 +52,21 @@ def estimate_offset(
     """Find the offset at which the score fits the video best.
 
     Args:
-        score: of the MIDI file.
-        tracks: the hands.
-        light: of each frame, see `KeyLight`.
-        given: the offset, if it is known: then only how well it fits is found out.
+        score: score of the MIDI file.
+        tracks: the tracked hands.
+        light: colours of the keys in each frame, see `KeyLight`.
+        given: the offset [s], if it is known; then only its fit is measured.
     """
     points, away = tracks.seen_points(), unattended(tracks)
     onset = np.floor(score.onset * FRAME_RATE + 0.5).astype(np.int64)
     lags = np.arange(-int(onset.max()), len(points))
-    # How many notes fall within the video, for every lag.
+    # Number of notes within the video, for every lag.
     counts = np.rint(fftconvolve(np.ones(len(points)), np.bincount(onset)[::-1]))
 
     def mean(
         value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]],
     ) -> NDArray[np.float64]:
-        """Of the value (T,) that each key has, at the onsets of all notes within the video."""
+        """Mean of a value (T,) of each key at the onsets of the notes, for every lag."""
         return np.asarray(_at_onsets(value, score.key, onset, len(lags)) / np.maximum(counts, 1))
 
     touched = mean(lambda key: touching(points, key) > np.exp(-1.0))
@@ -81,7 +83,7 @@ def estimate_offset(
     first = lags + score.onset.min() * FRAME_RATE
     together = np.minimum(first + length, len(points)) - np.maximum(first, 0)
     possible = (together >= _INSIDE * min(length, len(points))) & (counts > 0)
-    # Music repeats itself: that many notes fit says more than that a few fit very well.
+    # Music repeats itself, so a good fit of many notes is better evidence than one of few.
     sure = (total - np.median(total[possible])) * np.sqrt(counts)
     at = int(np.argmax(np.where(possible, sure, -np.inf)))
     if given is None:
@@ -93,7 +95,7 @@ def estimate_offset(
 
 
 def _rise(glow: Glow, key: int) -> NDArray[np.float32]:
-    """(T,) how much of a key comes on in each frame that was not on just before."""
+    """(T,) Increase of a key's glow in each frame, 0..1."""
     shine = np.clip(glow.standing_out(key), 0, 1)
     return np.maximum(np.diff(shine, prepend=shine[:1]), 0)
 
@@ -104,13 +106,13 @@ def _at_onsets(
     onset: NDArray[np.int64],
     lags: int,
 ) -> NDArray[np.float64]:
-    """(L,) sum of a value at the onsets of all notes, for every lag.
+    """(L,) Sum of a value at the onsets of all notes, for every lag, by convolution.
 
     Args:
-        value: gives (T,) of a key.
-        key: (N,) of the notes.
-        onset: (N,) [frames].
-        lags: L.
+        value: returns the value (T,) of a key.
+        key: (N,) key of each note.
+        onset: (N,) onset of each note [frames].
+        lags: number of lags, L.
     """
     total = np.zeros(lags)
     for each in range(KEYS):
@@ -122,6 +124,7 @@ def _at_onsets(
 
 
 def _vertex(value: NDArray[np.float64], at: int) -> float:
+    """Offset of the maximum of the parabola through three samples about `at`, in samples."""
     if not 0 < at < len(value) - 1:
         return 0.0
     before, here, after = value[at - 1 : at + 2]

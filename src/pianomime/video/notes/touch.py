@@ -1,4 +1,4 @@
-"""How near fingertips are to keys."""
+"""Measures of how near fingertips are to keys."""
 
 from __future__ import annotations
 
@@ -10,22 +10,25 @@ from pianomime.video.keyboard.geometry import BLACK_FRONT, FRONT
 from pianomime.world.parameters import key_centres
 
 _FREE = 0.003
-"""[m] beside the middle of a key that cost nothing."""
+"""[m] Distance from the middle line of a key that costs nothing."""
 _NEAR = 0.007
-"""[m] beyond that which cost 1 (it grows with the square)."""
+"""[m] Further distance that costs 1; the cost grows with its square."""
 _REACH = 0.010
-"""[m] that a fingertip may seem to lie in front of its key: nails and parallax."""
+"""[m] Distance in front of a key that costs nothing, due to finger nails and parallax."""
 
 _BLOCK = 10_000
-"""Frames."""
+"""Frames that are computed at once."""
 
 
 def misfit(points: NDArray[np.floating], key: NDArray[np.int64] | np.int64) -> NDArray[np.float64]:
-    """How badly fingertips fit keys, in squares of about a third of a key's width.
+    """Squared distance of fingertips from keys, in units of about a third of a key's width.
 
     Args:
-        points: (..., 2) world x, y [m]; a z behind them does no harm.
-        key: keys, of a shape that goes with (...).
+        points: (..., 2) or (..., 3) world x, y and z [m]; z is not used.
+        key: (...) keys, or one for all points.
+
+    Returns:
+        (...) misfit, 0 on the key.
     """
     beside = np.maximum(np.abs(points[..., 1] - key_centres()[key, 1]) - _FREE, 0.0)
     front = np.where(BLACK[key], BLACK_FRONT, FRONT) + _REACH
@@ -34,14 +37,14 @@ def misfit(points: NDArray[np.floating], key: NDArray[np.int64] | np.int64) -> N
 
 
 def touching(points: NDArray[np.floating], key: int) -> NDArray[np.float32]:
-    """(T,) how well the best of all fingertips fits a key, 0..1.
+    """(T,) How well the nearest fingertip fits a key: 1 on the key, falling to 0.
 
     Args:
-        points: (T, H, 6, 2) as `HandTracks.seen_points` gives them.
-        key: 0..87.
+        points: (T, H, 6, 2) as `HandTracks.seen_points` returns them.
+        key: the key, 0..87.
     """
     best = np.empty(len(points), np.float32)
-    # In blocks: hours at once take much memory.
+    # In blocks, because hours at once take much memory.
     for first in range(0, len(points), _BLOCK):
         part = slice(first, first + _BLOCK)
         off = misfit(points[part, :, 1:], np.int64(key)).min(axis=(1, 2), initial=np.inf)
