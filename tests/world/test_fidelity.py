@@ -38,6 +38,6 @@ def test_one_step_ahead(fidelity: ModuleType, clips: list[Any]) -> None:
     assert np.median(errors) <= 2e-4
 
 
-def test_experts_stay_near_the_prior(fidelity: ModuleType, clips: list[Any]) -> None:
-    near = np.concatenate([fidelity.near_prior(clip, every=10) for clip in clips])
+def test_experts_stay_near_the_base_controller(fidelity: ModuleType, clips: list[Any]) -> None:
+    near = np.concatenate([fidelity.near_base(clip, every=10) for clip in clips])
     assert near.mean() >= 0.99
