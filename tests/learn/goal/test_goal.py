@@ -12,7 +12,7 @@ from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.goals import Goals, read_goals, transpose
 from pianomime.learn.goal.sdf import KEYBOARD_LENGTH, distance
 from pianomime.learn.goal.training import load_encoder, train_goal
-from pianomime.learn.imitation.trainer_config import TrainerConfig
+from pianomime.learn.runs.trainer_config import TrainerConfig
 from pianomime.music import Score
 from pianomime.progress import no_progress
 from pianomime.world.parameters import key_centres

@@ -8,12 +8,12 @@ import torch
 
 from pianomime import load_player
 from pianomime.errors import InputError
-from pianomime.learn.data.samples import Samples
 from pianomime.learn.goal.autoencoder import GoalEncoder
 from pianomime.learn.imitation.config import POLICIES, DiffusionConfig, policy_config
 from pianomime.learn.imitation.export import export_policy, policy_info, torch_policy
 from pianomime.learn.imitation.network import PolicyNetwork
 from pianomime.learn.imitation.normalizer import AsinhNormalizer
+from pianomime.learn.imitation.samples import Samples
 from pianomime.learn.imitation.unet import FrameConvolution, TemporalEncoder
 from pianomime.policies.features import action_reference
 from pianomime.policies.methods import WEIGHTS

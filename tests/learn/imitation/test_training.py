@@ -13,8 +13,8 @@ from pianomime.learn.data.trajectories import write_trajectories
 from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.training import train_goal
 from pianomime.learn.imitation.config import DiffusionConfig, policy_config
-from pianomime.learn.imitation.trainer_config import TrainerConfig
 from pianomime.learn.imitation.training import train_policy
+from pianomime.learn.runs.trainer_config import TrainerConfig
 from pianomime.plan.demonstration import Demonstration
 from pianomime.policies.methods import WEIGHTS
 from pianomime.progress import no_progress

@@ -24,7 +24,7 @@ from pianomime.learn.expert.expert_run import Evaluation, ExpertRun
 from pianomime.learn.expert.ppo_model import Ppo, actor_network
 from pianomime.learn.expert.residual_policy import ACTIVATIONS, ResidualPolicyTracker
 from pianomime.learn.runs.safetensors_file import Arrays
-from pianomime.learn.torch_threads import torch_threads
+from pianomime.learn.runs.torch_threads import torch_threads
 from pianomime.plan.demonstration import DemonstrationPlanner
 from pianomime.players.player import PlannedPlayer
 from pianomime.progress import Progress

@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from stable_baselines3 import PPO
 
-from pianomime.learn.torch_threads import torch_threads
+from pianomime.learn.runs.torch_threads import torch_threads
 
 
 class Ppo(PPO):

@@ -24,7 +24,7 @@ from pianomime.learn.fingers.env import FingersVecEnv, PlannedSong
 from pianomime.learn.imitation.export import export_network
 from pianomime.learn.runs.log import RunLog
 from pianomime.learn.runs.run import RunFolder
-from pianomime.learn.torch_threads import torch_threads
+from pianomime.learn.runs.torch_threads import torch_threads
 from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.players.player import PlannedPlayer
 from pianomime.policies.finger_residual import ACTIONS, AGENTS, SIZE, FingerResidualTracker

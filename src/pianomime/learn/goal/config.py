@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pianomime.keyboard import KEYS
-from pianomime.learn.imitation.trainer_config import TrainerConfig
+from pianomime.learn.runs.trainer_config import TrainerConfig
 from pianomime.validation import within
 
 

@@ -18,8 +18,8 @@ from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.goals import Goals, GoalSampler, GoalSplit, read_goals
 from pianomime.learn.goal.picture import draw_codes
 from pianomime.learn.goal.sdf import KEYBOARD_LENGTH, QUERY_HIGH, QUERY_LOW, chamfer, distance
-from pianomime.learn.imitation.trainer import Batch, load_arrays, train_network
 from pianomime.learn.runs.safetensors_file import read_tensors, write_tensors
+from pianomime.learn.runs.trainer import Batch, load_arrays, train_network
 from pianomime.progress import Progress, no_progress
 
 _RESULT = "goal.safetensors"

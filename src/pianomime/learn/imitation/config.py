@@ -12,7 +12,7 @@ from typing import Annotated, Literal, get_args
 import tyro
 
 from pianomime.errors import InputError
-from pianomime.learn.imitation.trainer_config import TrainerConfig
+from pianomime.learn.runs.trainer_config import TrainerConfig
 from pianomime.policies.horizon import CHUNK
 from pianomime.validation import above_zero, one_of, within
 

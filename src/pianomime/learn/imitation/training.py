@@ -19,11 +19,11 @@ from pianomime.learn.data.dataset import (
     demonstration_dataset,
     trajectory_dataset,
 )
-from pianomime.learn.data.samples import Samples
 from pianomime.learn.imitation.config import PolicyConfig
 from pianomime.learn.imitation.export import export_policy, policy_info, torch_policy
 from pianomime.learn.imitation.network import PolicyNetwork
-from pianomime.learn.imitation.trainer import train_network
+from pianomime.learn.imitation.samples import Samples
+from pianomime.learn.runs.trainer import train_network
 from pianomime.policies.features import action_reference, to_world_frame
 from pianomime.policies.sampler import Sampler
 from pianomime.progress import Progress, no_progress

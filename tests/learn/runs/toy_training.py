@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from pianomime.learn.imitation.trainer import Batch, train_network
-from pianomime.learn.imitation.trainer_config import TrainerConfig
+from pianomime.learn.runs.trainer import Batch, train_network
+from pianomime.learn.runs.trainer_config import TrainerConfig
 
 CONFIG = TrainerConfig(
     steps=300, batch=32, learning_rate=3e-2, warmup=20, bfloat16=False, checkpoint_seconds=0.0

@@ -21,11 +21,11 @@ from torch import nn
 from toy_training import CONFIG, error, loss, network, sample_batch, stop_at, train
 
 from pianomime.errors import InputError, TrainingDiverged
-from pianomime.learn.imitation.trainer import learning_rate, load_weights
-from pianomime.learn.imitation.trainer_config import TrainerConfig
 from pianomime.learn.runs import run as run_module
 from pianomime.learn.runs.lock import run_lock
 from pianomime.learn.runs.run import RunFolder
+from pianomime.learn.runs.trainer import learning_rate, load_weights
+from pianomime.learn.runs.trainer_config import TrainerConfig
 
 
 def bits(folder: Path) -> dict[str, bytes]:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pianomime.learn.data.dataset import Dataset
-from pianomime.learn.data.samples import Samples
 from pianomime.learn.imitation.config import POLICIES, policy_config
+from pianomime.learn.imitation.samples import Samples
 from pianomime.policies.features import action_reference, octave_width, rest_points, to_world_frame
 from pianomime.world.hand import Hand
 from pianomime.world.model import SIDES

@@ -27,11 +27,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from pianomime.errors import InputError, TrainingDiverged
-from pianomime.learn.imitation.trainer_config import MAY_DIFFER, TrainerConfig
 from pianomime.learn.runs.log import RunLog
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.safetensors_file import Arrays
-from pianomime.learn.torch_threads import torch_threads
+from pianomime.learn.runs.torch_threads import torch_threads
+from pianomime.learn.runs.trainer_config import MAY_DIFFER, TrainerConfig
 from pianomime.progress import Progress, no_progress
 
 Batch = dict[str, Tensor]
