@@ -40,7 +40,8 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    assert set(results) == {"player", "effort", "seed", "seconds", "songs", "mean", "causes"}
+    asked = {"player", "effort", "seed", "settings", "seconds"}
+    assert set(results) == asked | {"songs", "mean", "causes"}
     assert results["seconds"] == 1.0
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())
@@ -125,7 +126,7 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
 
 def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
-    setup = {"player": "zero-shot", "effort": 0, "seed": 0, "seconds": 1.0}
+    setup = {"player": "zero-shot", "effort": 0, "seed": 0, "settings": {}, "seconds": 1.0}
     with Worker(SONG_WORKER, setup) as worker:
         assert "f1" in worker.ask(str(song))
         os.kill(worker.pid, signal.SIGKILL)
