@@ -164,7 +164,7 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
 
     module, config, _ = COMMANDS[name]
     kind = getattr(importlib.import_module(module), config)
-    settings: dict[str, str] | None = None
+    settings: dict[str, Any] | None = None
     if "settings" in kind.__dataclass_fields__:
         from pianomime.commands.player_settings import take_settings
 

@@ -19,6 +19,8 @@ def within(name: str, value: float, least: float, most: float = math.inf) -> Non
     Raises:
         InputError: it is; the message names it as the command line does.
     """
+    if not isinstance(value, int | float):
+        raise InputError(f"{name.replace('_', '-')} must be a number, not {value!r}")
     if not (least <= value <= most and math.isfinite(value)):
         wanted = f"{least:g} or more" if most == math.inf else f"{least:g} to {most:g}"
         raise InputError(f"{name.replace('_', '-')} must be {wanted}, not {value:g}")
@@ -30,6 +32,8 @@ def above_zero(name: str, value: float) -> None:
     Raises:
         InputError: it is not; the message names it as the command line does.
     """
+    if not isinstance(value, int | float):
+        raise InputError(f"{name.replace('_', '-')} must be a number, not {value!r}")
     if not 0 < value < math.inf:
         raise InputError(f"{name.replace('_', '-')} must be more than 0, not {value:g}")
 
@@ -42,8 +46,9 @@ def finite(config: DataclassInstance) -> None:
     """
     for field in dataclasses.fields(config):
         value = getattr(config, field.name)
-        if isinstance(value, int | float):
-            within(field.name, value, 0)
+        for each in value if isinstance(value, tuple) else (value,):
+            if isinstance(each, int | float):
+                within(field.name, each, 0)
 
 
 def one_of(name: str, value: str, choices: Sequence[str]) -> None:

@@ -3,8 +3,8 @@
 The work is named as "package.module:function". The function is called once in the new
 process with a setup, and returns what answers requests: that is where a player or a network is
 loaded. An exception costs one request, and so does a crash, after which the process is started
-again. It ends when its input does, also in the middle of work, and so does not outlive the process
-that asked, however that ends.
+again. The process ends when its input does, also in the middle of work, and so does not outlive the
+process that asked, however that ends.
 
 These are plain processes, rather than forks or children of `multiprocessing`, so that a script that
 starts some needs no `if __name__ == "__main__"`, and libraries with threads are safe.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
@@ -38,7 +38,7 @@ class Evaluate:
     """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
     On two cores 1 takes about as long as the music or less, 2 and 3 several times longer. For
     generalists it is 2, 5, 20 or 100 steps of the diffusion."""
-    settings: tyro.conf.Suppress[dict[str, str]] = field(default_factory=dict)
+    settings: tyro.conf.Suppress[dict[str, Any]] = field(default_factory=dict)
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """How much of each song to play at most, from its first note [s]."""

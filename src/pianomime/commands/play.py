@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -54,7 +54,7 @@ class Play:
     generalists it is 2, 5, 20 or 100 steps of the diffusion."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Seed of everything that is random."""
-    settings: tyro.conf.Suppress[dict[str, str]] = field(default_factory=dict)
+    settings: tyro.conf.Suppress[dict[str, Any]] = field(default_factory=dict)
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """How much to play at most, from what sounds at START or first after it [s]."""

@@ -2,38 +2,50 @@
 
 from __future__ import annotations
 
+import json
+from typing import Any
+
 from pianomime.errors import InputError
 
-GROUPS = ("planner", "tracker", "sampling", "sampler")
-"""What options of settings begin with."""
+OWN = "player."
+"""What stands before a setting that is in no group, as those of other people's players may be."""
 
 
-def take_settings(arguments: list[str]) -> tuple[list[str], dict[str, str]]:
+def take_settings(arguments: list[str]) -> tuple[list[str], dict[str, Any]]:
     """Settings, taken out of a command line.
 
-    Which settings there are is for the player to say, so they cannot be options of the command.
+    Which settings there are is for the player to say, so they cannot be options of the command:
+    every option with a dot is one. `--player.NAME` sets NAME, a setting that is in no group.
 
     Args:
         arguments: of the command.
 
     Returns:
-        The other arguments, and the settings by name, as texts.
+        The other arguments, and the settings by name: numbers and other JSON as what they are,
+        anything else as text.
 
     Raises:
         InputError: a setting has no value.
     """
     rest: list[str] = []
-    settings: dict[str, str] = {}
-    waiting = iter(arguments)
-    for argument in waiting:
+    settings: dict[str, Any] = {}
+    waiting = list(reversed(arguments))
+    while waiting:
+        argument = waiting.pop()
         name, equals, value = argument.removeprefix("--").partition("=")
-        if not argument.startswith("--") or name.partition(".")[0] not in GROUPS or "." not in name:
+        if not argument.startswith("--") or "." not in name:
             rest.append(argument)
             continue
         if not equals:
-            try:
-                value = next(waiting)
-            except StopIteration:
-                raise InputError(f"{argument}: needs a value") from None
-        settings[name.replace("-", "_")] = value
+            if not waiting or waiting[-1].startswith("--"):
+                raise InputError(f"{argument}: needs a value")
+            value = waiting.pop()
+        settings[name.removeprefix(OWN).replace("-", "_")] = _value(value)
     return rest, settings
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text

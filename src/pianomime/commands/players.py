@@ -12,7 +12,8 @@ import tyro
 class Players:
     """List the players, those of other packages included, or the settings of one.
 
-    A setting is an option of `pianomime play` and `pianomime evaluate`.
+    A setting is an option of `pianomime play` and `pianomime evaluate`; its value is shown as it is
+    at the default effort.
 
     Examples:
       pianomime players
@@ -29,10 +30,15 @@ class Players:
         Raises:
             InputError: there is no such player.
         """
+        import json
+
         from pianomime.players.registry import player_names, player_settings
 
         if not self.player:
             print("\n".join(player_names()))
             return
-        for name, value in player_settings(self.player).items():
-            print(f"--{name.replace('_', '-')} {value}")
+        settings = player_settings(self.player)
+        for name, value in settings.items():
+            print(f"--{name.replace('_', '-')} {json.dumps(value)}")
+        if not settings:
+            print(f"{self.player} has no settings")

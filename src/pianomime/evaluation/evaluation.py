@@ -16,10 +16,10 @@ from typing import Any
 import pianomime
 from pianomime.errors import InputError
 from pianomime.evaluation.song_worker import SONG_WORKER, play_song
-from pianomime.files import atomic
+from pianomime.files import atomic, files_digest
 from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.players.player import Player
-from pianomime.players.registry import EFFORT, load_player, player_files
+from pianomime.players.registry import EFFORT, is_registered, load_player, player_files
 from pianomime.players.settings import flat
 from pianomime.progress import Progress, no_progress
 from pianomime.songs.find import find_songs
@@ -82,13 +82,18 @@ def evaluate(
         raise InputError(f"seconds must be more than 0, not {seconds:g}")
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
-    chosen = flat(settings or {})
+    chosen = _checked(flat(settings or {}))
     # What is wrong with the player is reported here, once, and not by every song.
     loaded = load_player(player, effort, seed, **chosen)
+    if loaded.excerpt is not None and seconds != EXCERPT_SECONDS:
+        raise InputError("seconds: this player plays the excerpt that it was trained on")
+    # Other processes cannot load such a player, and nobody can tell what it depends on.
+    only_here = isinstance(player, Player) or is_registered(player)
     made_by = ""
-    if not isinstance(player, Player):
-        key = [str(player), effort, seed, chosen, f"{seconds:g}", _digest(player_files(player))]
-        made_by = f"{json.dumps(key, sort_keys=True, default=str)} {_program_hash()}"
+    if not only_here:
+        files = files_digest(player_files(str(player)))
+        key = [str(player), effort, seed, chosen, f"{seconds:g}", files]
+        made_by = f"{json.dumps(key, sort_keys=True)} {_program_hash()}"
     store = None if out is None else _Store(Path(out), made_by)
 
     rows: dict[Path, Row] = {}
@@ -108,7 +113,7 @@ def evaluate(
         else:
             rows[song] = known
             report()
-    if isinstance(player, Player):
+    if only_here:
         playing = _in_this_process(waiting, loaded, seconds)
     else:
         setup = {
@@ -130,7 +135,7 @@ def evaluate(
     results = {
         "player": loaded.name if isinstance(player, Player) else str(player),
         "effort": loaded.effort if isinstance(player, Player) else effort,
-        "seed": seed,
+        "seed": None if isinstance(player, Player) else seed,
         "settings": chosen,
         "seconds": seconds if math.isfinite(seconds) else None,
         "songs": [rows[song] for song in songs],
@@ -140,6 +145,23 @@ def evaluate(
     if store is not None:
         store.close(results)
     return results
+
+
+def _checked(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings that say everything about the player that files do not.
+
+    Raises:
+        InputError: one names a file, whose content the results would not be keyed by, or cannot be
+            handed to other processes.
+    """
+    for name, value in settings.items():
+        if name in ("demonstration", "run", "weights"):
+            raise InputError(f"{name} is no setting here: name its path as the player")
+        try:
+            json.dumps(value, allow_nan=False)
+        except (TypeError, ValueError):
+            raise InputError(f"setting {name} must be what JSON can hold, not {value!r}") from None
+    return settings
 
 
 def _in_this_process(
@@ -261,13 +283,7 @@ def _program_hash() -> str:
         with contextlib.suppress(PackageNotFoundError):  # Not all are in every installation.
             digest.update(f"{library} {version(library)} ".encode())
     files = sorted(Path(pianomime.__file__).parent.rglob("*"))
-    digest.update(_digest(file for file in files if file.suffix in (".py", ".json")).encode())
-    return digest.hexdigest()
-
-
-def _digest(files: Iterable[Path]) -> str:
-    """Changes with the content of files."""
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
+    digest.update(
+        files_digest([file for file in files if file.suffix in (".py", ".json")]).encode()
+    )
     return digest.hexdigest()

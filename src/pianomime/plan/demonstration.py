@@ -170,15 +170,21 @@ class DemonstrationPlanner:
         """Return the demonstration's plan.
 
         Args:
-            score: must have the same roll as the demonstration's score.
+            score: must have the same roll as the demonstration's score, or as its beginning.
 
         Raises:
             InputError: it is another score.
         """
-        known = self.demonstration.score
-        if score is not known and not np.array_equal(score.roll(), known.roll()):
-            raise InputError(f"{score.title}: is not the score of the demonstration {known.title}")
-        return self.demonstration.plan
+        shown = self.demonstration
+        if score.frames() < shown.score.frames() and score.duration > 0:
+            shown = shown.excerpt(0.0, score.duration)
+        same = np.array_equal(score.roll(), shown.score.roll()) and len(score) == len(shown.score)
+        if score is not shown.score and not same:
+            raise InputError(
+                f"{score.title}, {score.duration:.1f} s: is not the score of the demonstration "
+                f"{shown.score.title}, {self.demonstration.score.duration:.1f} s"
+            )
+        return shown.plan
 
 
 def on_grid(score: Score) -> Score:

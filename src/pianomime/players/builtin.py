@@ -21,7 +21,6 @@ from pianomime.policies.methods import (
     policy_path,
 )
 from pianomime.policies.policy import load_policy
-from pianomime.policies.sampler import Sampler
 from pianomime.track import (
     DynamicConfig,
     DynamicTracker,
@@ -33,7 +32,7 @@ from pianomime.track import (
 )
 
 
-def _searching(tracker: Tracker, effort: int, sampling: PredictiveSamplingConfig) -> Tracker:
+def _with_sampling(tracker: Tracker, effort: int, sampling: PredictiveSamplingConfig) -> Tracker:
     return PredictiveSamplingTracker(tracker, sampling) if effort else tracker
 
 
@@ -48,7 +47,7 @@ def _zero_shot(effort: int, seed: int, **settings: Any) -> Player:
         tracker=DynamicConfig(),
         sampling=_budget(effort, seed),
     )
-    controls = _searching(DynamicTracker(tracker), effort, sampling)
+    controls = _with_sampling(DynamicTracker(tracker), effort, sampling)
     return PlannedPlayer("zero-shot", ZeroShotPlanner(planner), controls, effort)
 
 
@@ -57,11 +56,11 @@ def _zero_shot_ik(effort: int, seed: int, **settings: Any) -> Player:
     return PlannedPlayer("zero-shot-ik", ZeroShotPlanner(planner), IkTracker(tracker))
 
 
-def _fingers(effort: int, seed: int, weights: Path | None = None, **settings: Any) -> Player:
+def _fingers(effort: int, seed: int, weights: str | Path | None = None, **settings: Any) -> Player:
     planner, sampling = configure(
         settings, planner=ZeroShotConfig(), sampling=_budget(effort, seed)
     )
-    controls = _searching(load_finger_tracker(weights), effort, sampling)
+    controls = _with_sampling(load_finger_tracker(weights), effort, sampling)
     return PlannedPlayer(FINGERS, ZeroShotPlanner(planner), controls, effort)
 
 
@@ -70,7 +69,7 @@ def _demonstration(
 ) -> Player:
     tracker, sampling = configure(settings, tracker=DynamicConfig(), sampling=_budget(effort, seed))
     planner = _demonstration_planner(demonstration)
-    controls = _searching(DynamicTracker(tracker), effort, sampling)
+    controls = _with_sampling(DynamicTracker(tracker), effort, sampling)
     return PlannedPlayer("demonstration", planner, controls, effort)
 
 
@@ -92,7 +91,7 @@ def _demonstration_planner(demonstration: Demonstration | str | Path) -> Demonst
 
 
 def _generalist(method: str) -> PlayerFactory:
-    def make(effort: int, seed: int, weights: Path | None = None, **settings: Any) -> Player:
+    def make(effort: int, seed: int, weights: str | Path | None = None, **settings: Any) -> Player:
         (sampler,) = configure(settings, sampler=SAMPLERS[effort])
         *high, low = GENERALISTS[method]
         tracker = load_policy_tracker(policy_path(low, weights), sampler, seed, low)
@@ -112,13 +111,13 @@ FACTORIES: dict[str, PlayerFactory] = {
 }
 """What makes each player, by name."""
 
-_SEARCH = {"sampling": PredictiveSamplingConfig()}
+_SAMPLING = {"sampling": PredictiveSamplingConfig.of_effort(1)}
 SETTINGS: dict[str, dict[str, Any]] = {
-    "zero-shot": {"planner": ZeroShotConfig(), "tracker": DynamicConfig(), **_SEARCH},
+    "zero-shot": {"planner": ZeroShotConfig(), "tracker": DynamicConfig(), **_SAMPLING},
     "zero-shot-ik": {"planner": ZeroShotConfig(), "tracker": IkConfig()},
-    FINGERS: {"planner": ZeroShotConfig(), **_SEARCH},
-    **{method: {"sampler": Sampler()} for method in GENERALISTS},
-    "demonstration": {"tracker": DynamicConfig(), **_SEARCH},
+    FINGERS: {"planner": ZeroShotConfig(), **_SAMPLING},
+    **{method: {"sampler": SAMPLERS[1]} for method in GENERALISTS},
+    "demonstration": {"tracker": DynamicConfig(), **_SAMPLING},
     "demonstration-ik": {"tracker": IkConfig()},
 }
-"""The configs whose fields are the settings of each player, by group."""
+"""The configs whose fields are the settings of each player, by group, at effort 1."""

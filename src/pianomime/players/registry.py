@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
-import os
-import sys
-from functools import cache
+from contextlib import nullcontext
+from functools import cache, partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,8 @@ from typing import Any
 from pianomime.errors import InputError, unknown_name
 from pianomime.players.builtin import FACTORIES, SETTINGS
 from pianomime.players.player import Player
-from pianomime.players.settings import PlayerFactory, settings_of
+from pianomime.players.plugin import import_factory, one_line, plugin_files
+from pianomime.players.settings import PlayerFactory, flat, settings_of
 from pianomime.policies.methods import METHODS, weight_files
 
 EFFORT = 1
@@ -29,14 +28,15 @@ RUN_FILE = "run.json"
 EXPERT = "expert"
 """The player of an expert, which is loaded by its folder."""
 
-_factories = dict(FACTORIES)
+_registered: dict[str, PlayerFactory] = {}
 
 
 def register_player(name: str, factory: PlayerFactory) -> None:
     """Make a player known to `load_player`, in this process.
 
-    Worker processes do not see it: `evaluate` and the command line find players by entry points
-    (group `pianomime.players`) or as "package.module:factory".
+    Other processes do not see it: commands find players by entry points (group
+    `pianomime.players`) or as "package.module:factory", and `evaluate` plays a player that is
+    registered here in this process, one song after the other.
 
     Args:
         name: what it is called; an earlier player of that name is replaced.
@@ -47,12 +47,17 @@ def register_player(name: str, factory: PlayerFactory) -> None:
     """
     if not name or any(sign in name for sign in ":/\\ ") or name.endswith(".npz"):
         raise InputError(f"a player cannot be called {name!r}")
-    _factories[name] = factory
+    _registered[name] = factory
 
 
 def player_names() -> list[str]:
     """The names that `load_player` knows, those of entry points included."""
-    return [*_factories, *(name for name in _entry_points() if name not in _factories)]
+    return list(dict.fromkeys([*FACTORIES, *_registered, *_entry_points()]))
+
+
+def is_registered(source: str | Path | Player) -> bool:
+    """Whether `register_player` made it known: other processes cannot load it."""
+    return isinstance(source, str) and source in _registered
 
 
 def load_player(
@@ -83,16 +88,31 @@ def load_player(
         if settings:
             raise InputError(f"{source.name}: a player that is made already takes no settings")
         return source
-    if effort not in range(4):
-        raise InputError(f"effort must be 0, 1, 2 or 3, not {effort}")
-    if seed < 0:
-        raise InputError(f"seed must be 0 or more, not {seed}")
+    if not isinstance(source, str | Path):
+        raise InputError(f"a player is a name, a path or a pianomime.Player, not {source!r}")
+    if not _is_integer(effort) or effort not in range(4):
+        raise InputError(f"effort must be 0, 1, 2 or 3, not {effort!r}")
+    if not _is_integer(seed) or seed < 0:
+        raise InputError(f"seed must be 0 or more, not {seed!r}")
     factory, _ = _find(source)
-    return _call(factory, str(source), {"effort": effort, "seed": seed, **settings})
+    arguments = {"effort": effort, "seed": seed, **flat(settings)}
+    try:
+        inspect.signature(factory).bind(**arguments)
+    except TypeError as error:
+        raise InputError(f"{source}: {error}") from error
+    ours = isinstance(factory, partial) or factory in FACTORIES.values()
+    with nullcontext() if ours else one_line(str(source)):
+        player = factory(**arguments)
+    if not isinstance(player, Player):
+        raise InputError(f"{source}: makes a {type(player).__name__}, which is no pianomime.Player")
+    return player
 
 
 def player_files(source: str | Path) -> list[Path]:
-    """The files that decide how a player plays: weights, a run, a demonstration, a module.
+    """The files that decide how a player plays, such as weights, a run or a plugin's modules.
+
+    Args:
+        source: as for `load_player`, but not registered in this process alone.
 
     Raises:
         InputError: there is no such player, or one of its files is not there.
@@ -101,7 +121,7 @@ def player_files(source: str | Path) -> list[Path]:
 
 
 def player_settings(name: str) -> dict[str, Any]:
-    """The settings that a player takes, with the values that they have unless told otherwise.
+    """The settings that a player takes, with their values at the default effort.
 
     Args:
         name: one of `player_names`; players of other packages do not tell their settings.
@@ -117,83 +137,32 @@ def player_settings(name: str) -> dict[str, Any]:
 def _find(source: str | Path) -> tuple[PlayerFactory, list[Path]]:
     """What makes a player, and the files that decide how it plays."""
     name = str(source)
-    if name in _factories:
-        factory = _factories[name]
-        return factory, weight_files(name) if name in METHODS else _source_file(factory)
+    if name in _registered:
+        return _registered[name], []
+    if name in FACTORIES:
+        return FACTORIES[name], weight_files(name) if name in METHODS else []
     if name in _entry_points():
-        return _imported(_entry_points()[name])
+        place = _entry_points()[name]
+        return import_factory(place), plugin_files(place)
     path = Path(name)
     if path.suffix == ".npz":
         if not path.is_file():
             raise InputError(f"{name}: no such demonstration")
-        return _of_demonstration(path), [path]
+        return partial(FACTORIES["demonstration"], demonstration=path), [path]
     if path.is_dir():
         return _of_folder(path)
     if path.name in METHODS and any(path.parent.glob("*.onnx")):
         return _of_weights(path.name, path.parent)
     if ":" in name:
-        return _imported(name)
+        return import_factory(name), plugin_files(name)
     raise unknown_name("player", name, player_names())
-
-
-def _call(factory: PlayerFactory, name: str, arguments: dict[str, Any]) -> Player:
-    try:
-        inspect.signature(factory).bind(**arguments)
-    except TypeError as error:
-        raise InputError(f"{name}: {error}") from error
-    player = factory(**arguments)
-    if not isinstance(player, Player):
-        raise InputError(f"{name}: makes a {type(player).__name__}, which is no pianomime.Player")
-    return player
-
-
-@cache
-def _entry_points() -> dict[str, str]:
-    return {point.name: point.value for point in entry_points(group=GROUP)}
-
-
-def _imported(place: str) -> tuple[PlayerFactory, list[Path]]:
-    """The factory at "package.module:factory", and the file that it is in."""
-    module, _, name = place.partition(":")
-    # A file in the present folder will do, also for the command line. It comes last, so that
-    # nothing in that folder hides a library.
-    if os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
-    try:
-        factory: Any = importlib.import_module(module)
-        for part in name.split("."):
-            factory = getattr(factory, part)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InputError(f"{place}: {error}") from error
-    if not callable(factory):
-        raise InputError(f"{place}: cannot be called to make a player")
-    return factory, _source_file(factory)
-
-
-def _source_file(factory: PlayerFactory) -> list[Path]:
-    try:
-        file = inspect.getsourcefile(factory)
-    except TypeError:
-        file = None
-    return [] if file is None else [Path(file)]
-
-
-def _of_demonstration(path: Path) -> PlayerFactory:
-    def make(effort: int, seed: int, **settings: Any) -> Player:
-        return FACTORIES["demonstration"](effort=effort, seed=seed, demonstration=path, **settings)
-
-    return make
 
 
 def _of_folder(path: Path) -> tuple[PlayerFactory, list[Path]]:
     if (path / RUN_FILE).is_file():
         # What plays experts stands above this room, and announces itself as others do.
-        expert, source = _imported(_entry_points()[EXPERT])
-
-        def make(effort: int, seed: int) -> Player:
-            return expert(effort=effort, seed=seed, run=path)
-
-        return make, [*source, *sorted(file for file in path.iterdir() if file.is_file())]
+        factory = partial(import_factory(_entry_points()[EXPERT]), run=path)
+        return factory, sorted(file for file in path.iterdir() if file.is_file())
     there = {file.stem for file in path.glob("*.onnx")}
     whole = [method for method, policies in METHODS.items() if there.issuperset(policies)]
     if not whole:
@@ -205,7 +174,13 @@ def _of_folder(path: Path) -> tuple[PlayerFactory, list[Path]]:
 
 
 def _of_weights(method: str, weights: Path) -> tuple[PlayerFactory, list[Path]]:
-    def make(effort: int, seed: int, **settings: Any) -> Player:
-        return _factories[method](effort=effort, seed=seed, weights=weights, **settings)
+    return partial(FACTORIES[method], weights=weights), weight_files(method, weights)
 
-    return make, weight_files(method, weights)
+
+@cache
+def _entry_points() -> dict[str, str]:
+    return {point.name: point.value for point in entry_points(group=GROUP)}
+
+
+def _is_integer(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)

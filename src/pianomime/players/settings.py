@@ -133,4 +133,8 @@ def _converted(value: Any, known: Any, name: str) -> Any:
         value = tuple(value)
     if type(value) is not kind:
         raise InputError(f"{name} must be of the kind {kind.__name__}, not {value!r}")
+    if isinstance(value, tuple):
+        if len(value) != len(known):
+            raise InputError(f"{name} must be {len(known)} numbers, not {value!r}")
+        return tuple(_converted(each, one, name) for each, one in zip(value, known, strict=True))
     return value

@@ -63,7 +63,7 @@ class OneStageController:
 
     @property
     def plan(self) -> FingertipPlan:
-        """Nothing was planned: where the hands were, and the finger nearest to each goal."""
+        """Where the hands were so far, and the finger nearest to each goal: nothing was planned."""
         return self._record.plan()
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:

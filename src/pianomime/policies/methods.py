@@ -40,7 +40,7 @@ _TRAINED_BY = {FINGERS: "train-fingers", "multi-task-sac": "train-sac"}
 """The command that trains a policy, where it is not `train POLICY`."""
 
 
-def load_finger_tracker(weights: Path | None = None) -> FingerResidualTracker:
+def load_finger_tracker(weights: str | Path | None = None) -> FingerResidualTracker:
     """The tracker with the finger residual.
 
     Args:
@@ -77,7 +77,7 @@ def weights_folder() -> Path:
     return Path(os.environ.get(WEIGHTS) or Path(__file__).with_name("weights"))
 
 
-def policy_path(name: str, weights: Path | None = None) -> Path:
+def policy_path(name: str, weights: str | Path | None = None) -> Path:
     """The file of a policy.
 
     Args:
@@ -87,7 +87,7 @@ def policy_path(name: str, weights: Path | None = None) -> Path:
     Raises:
         InputError: it is not there.
     """
-    path = (weights or weights_folder()) / f"{name}.onnx"
+    path = Path(weights or weights_folder()) / f"{name}.onnx"
     if not path.is_file():
         command = _TRAINED_BY.get(name, f"train {name}")
         raise InputError(
@@ -97,7 +97,7 @@ def policy_path(name: str, weights: Path | None = None) -> Path:
     return path
 
 
-def weight_files(method: str, weights: Path | None = None) -> list[Path]:
+def weight_files(method: str, weights: str | Path | None = None) -> list[Path]:
     """The files of a method's policies.
 
     Args:

@@ -15,6 +15,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.validation import within
+
 Denoise = Callable[[NDArray[np.float32], NDArray[np.int64]], NDArray[np.float32]]
 """The network: from noisy chunks (B, T, D) and diffusion steps (B,) to predictions (B, T, D)."""
 
@@ -27,6 +29,10 @@ class Sampler:
     """Evaluations of the network; at most as many as the diffusion has steps."""
     eta: float = 0.0
     """Noise added on the way: 0 is DDIM; 1 with all steps is DDPM, as in the paper."""
+
+    def __post_init__(self) -> None:
+        within("steps", self.steps, 1)
+        within("eta", self.eta, 0, 1)
 
 
 @cache

@@ -82,7 +82,7 @@ def weighted_rewards(
     """
     rewards: dict[str, NDArray[np.float64]] = {}
     for term in terms:
-        values = term.func(state)
+        values = np.asarray(term.func(state))
         if values.shape != (len(state),):
             raise ValueError(
                 f"reward term {term.name!r} must have the shape {(len(state),)}, not {values.shape}"

@@ -99,7 +99,10 @@ class ExpertRun:
         content = dict(folder.config)
         excerpt = content.pop(_EXCERPT, None)
         if folder.kind != _KIND or not isinstance(excerpt, dict):
-            raise InputError(f"{path}: not the run of an expert, but of a {folder.kind}")
+            raise InputError(
+                f"{path}: not the run of an expert; if it trains a policy, name the folder above, "
+                "which holds its .onnx file"
+            )
         try:
             start, seconds = float(excerpt["start"]), float(excerpt["seconds"])
             config = from_json(ExpertConfig, content)

@@ -1,1 +1,1 @@
-"""Runs: folders of trainings that can be resumed, and the processes that work in them."""
+"""Runs: folders of trainings that can be resumed, and the training loop of networks."""
