@@ -66,8 +66,8 @@ def row(song: Path, out: Path, minutes: float) -> dict[str, Any]:
     best = run.best()[1]
     zero_shot = out.with_name(out.name + ".zero-shot")
     if not zero_shot.exists():
-        player = replace(load_player("zero-shot"), planner=DemonstrationPlanner(run.song))
-        zero_shot.write_text(str(player.play(run.song.score).metrics()["f1"]), "utf-8")
+        player = replace(load_player("zero-shot"), planner=DemonstrationPlanner(run.demonstration))
+        zero_shot.write_text(str(player.play(run.demonstration.score).metrics()["f1"]), "utf-8")
     return {
         "song": song.stem,
         "seed": run.config.seed,

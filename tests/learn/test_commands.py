@@ -55,7 +55,7 @@ def test_a_bundled_song_needs_no_demonstration() -> None:
     quick = [*QUICK, "--method", "search", "--seconds", "2"]
     main(["train-expert", "ode-to-joy", *quick])
     run = ExpertRun.load(Path("out/expert-ode-to-joy-paper"))
-    assert run.song.source == "zero-shot plan"
+    assert run.demonstration.source == "zero-shot plan"
     main(["play", "ode-to-joy", "--player", str(run.path), "--no-video", "-o", "report"])
 
 

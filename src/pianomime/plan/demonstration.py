@@ -37,8 +37,8 @@ class Demonstration:
         source: what the plan was made from: the name of a video, of a data set or of a planner.
         homography: (3, 3) from pixels of the video to world x, y [m]; all NaN where unknown.
         quality: how well the source could be read, by name: numbers, texts or lists.
-        song: id that all demonstrations of one song share, so that they can be kept on one side
-            of a train-validation split; -1 where unknown.
+        song_id: number that all demonstrations of one song share, so that they can be kept on one
+            side of a train-validation split; -1 where unknown.
         split: part of the data set that it belongs to; only "train" is used for training.
 
     Raises:
@@ -50,7 +50,7 @@ class Demonstration:
     source: str = ""
     homography: NDArray[np.float64] = field(default_factory=lambda: np.full((3, 3), np.nan))
     quality: dict[str, Any] = field(default_factory=dict)
-    song: int = -1
+    song_id: int = -1
     split: str = TRAIN
 
     def __post_init__(self) -> None:
@@ -114,7 +114,7 @@ class Demonstration:
             "score_title": np.array(self.score.title),
             "homography": self.homography,
             "quality": np.array(json.dumps(self.quality)),
-            "song": np.array(self.song),
+            "song_id": np.array(self.song_id),
             "split": np.array(self.split),
         }
         for name in _SCORE:
@@ -151,7 +151,7 @@ class Demonstration:
             arrays["homography"],
             json.loads(str(arrays["quality"])),
             # Files of earlier versions lack these two.
-            int(arrays.get("song", -1)),
+            int(arrays.get("song_id", arrays.get("song", -1))),
             str(arrays.get("split", TRAIN)),
         )
 

@@ -19,14 +19,14 @@ QUIET = DaggerConfig(noise=0.0)
 
 
 def test_without_noise_the_expert_plays(two_notes):
-    episode = collect_dagger_episode(replace(two_notes, song=7), 0, QUIET)
+    episode = collect_dagger_episode(replace(two_notes, song_id=7), 0, QUIET)
     controller, world = DynamicTracker().start(make_feasible(two_notes.plan)), World()
     for frame in range(len(two_notes.plan)):
         np.testing.assert_allclose(episode.columns["joints"][frame], world.qpos_hands, atol=1e-6)
         ctrl = controller.control(frame, world)
         np.testing.assert_allclose(episode.columns["action"][frame], ctrl, atol=1e-6)
         world.step(ctrl)
-    assert episode.song == 7
+    assert episode.song_id == 7
     assert episode.f1 > 0.7
 
 
@@ -45,7 +45,7 @@ def test_with_noise_the_labels_are_the_experts(two_notes):
 
 
 def test_episodes_are_the_same_however_many_are_played_at_once(two_notes):
-    clips, config = [replace(two_notes, song=song) for song in range(3)], DaggerConfig()
+    clips, config = [replace(two_notes, song_id=song) for song in range(3)], DaggerConfig()
     alone = [one.columns["action"] for one in collect_dagger(clips, config, jobs=1)]
     together = [one.columns["action"] for one in collect_dagger(clips, config, jobs=2)]
     np.testing.assert_array_equal(alone, together)
@@ -54,7 +54,7 @@ def test_episodes_are_the_same_however_many_are_played_at_once(two_notes):
 
 def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
     for number in range(5):
-        replace(two_notes, song=number).save(tmp_path / f"{number}.npz")
+        replace(two_notes, song_id=number).save(tmp_path / f"{number}.npz")
     replace(two_notes, split="test").save(tmp_path / "not for training.npz")
     out = tmp_path / "dagger.zarr"
     cli.main(
@@ -62,7 +62,7 @@ def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
         + ["--max-demonstrations", "2"]
     )
     assert "played: 2," in capsys.readouterr().out
-    assert [episode["song"] for episode in TrajectoryData.open(out).episodes] == [0, 3]
+    assert [episode["song_id"] for episode in TrajectoryData.open(out).episodes] == [0, 3]
 
 
 @pytest.mark.parametrize(

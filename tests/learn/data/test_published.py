@@ -91,7 +91,7 @@ def test_what_is_not_for_training_is_left_out_of_it(four_clips, tmp_path):
 
     cli.main(["import-demos", str(four_clips), "-o", str(tmp_path / "demos")])
     made = [Demonstration.load(file) for file in sorted((tmp_path / "demos").iterdir())]
-    assert [(one.song, one.split) for one in made] == [
+    assert [(one.song_id, one.split) for one in made] == [
         (3, "train"),
         (3, "train"),
         (5, "test"),
@@ -106,10 +106,10 @@ def test_a_file_of_before_there_were_splits_is_for_training(four_clips, tmp_path
     made, _ = list(read_published(four_clips))[2]
     made.save(tmp_path / "one.npz")
     with np.load(tmp_path / "one.npz") as file:
-        older = {name: file[name] for name in file.files if name not in ("song", "split")}
+        older = {name: file[name] for name in file.files if name not in ("song_id", "split")}
     np.savez(tmp_path / "older.npz", **older)
     there = Demonstration.load(tmp_path / "older.npz")
-    assert (there.song, there.split) == (-1, "train")
+    assert (there.song_id, there.split) == (-1, "train")
     np.testing.assert_array_equal(there.plan.finger_key, made.plan.finger_key)
 
 

@@ -28,7 +28,7 @@ def runs(
     two_notes: Demonstration, tmp_path: Path, small_ppo: ExpertConfig, small_search: ExpertConfig
 ) -> Path:
     """A run of each method in one folder, and one that was not begun."""
-    dataclasses.replace(two_notes, song=42, split="test").save(tmp_path / "demo.npz")
+    dataclasses.replace(two_notes, song_id=42, split="test").save(tmp_path / "demo.npz")
     for name, config in (("a", small_ppo), ("b", small_search)):
         short = dataclasses.replace(config, total_steps=128)
         train_expert(tmp_path / "demo.npz", tmp_path / "runs" / name, short, threads=1)
@@ -42,7 +42,7 @@ def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
     assert len(data) == 2
     for number, folder in enumerate(find_expert_runs(runs)):
         player, run = load_expert(folder)
-        performance = player.play(run.song.score)
+        performance = player.play(run.demonstration.score)
         episode = data.episode(number)
         columns = episode.columns
         assert episode.f1 == pytest.approx(performance.metrics()["f1"])
@@ -53,8 +53,8 @@ def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
         )
         np.testing.assert_allclose(columns["joints"][1:], performance.qpos[:-1, 88:], atol=1e-6)
         np.testing.assert_allclose(columns["keys"][1:], performance.key_state[:-1], atol=1e-6)
-        np.testing.assert_array_equal(columns["goal"], run.song.score.roll())
-        assert (episode.song, episode.split) == (42, "test")
+        np.testing.assert_array_equal(columns["goal"], run.demonstration.score.roll())
+        assert (episode.song_id, episode.split) == (42, "test")
 
 
 def test_it_reads_in_a_few_lines(runs: Path, tmp_path: Path) -> None:
@@ -144,12 +144,12 @@ def test_published_experts_come_into_the_same_form(tmp_path: Path) -> None:
     out = tmp_path / "experts.zarr"
     Collect((tmp_path / "experts.npz",), out, tmp_path / "demonstrations.npz").run()
     episode = TrajectoryData.open(out).episode(0)
-    assert (episode.name, episode.song, episode.split) == ("clip007", -1, "train")
+    assert (episode.name, episode.song_id, episode.split) == ("clip007", -1, "train")
     with np.load(tmp_path / "demonstrations.npz") as file:
         marks = {"song_group": [4, 9], "split": ["train", "train"], "odd": [False, True]}
         np.savez(tmp_path / "marked.npz", **file, **marks)
     marked, _ = next(published_episodes(tmp_path / "experts.npz", tmp_path / "marked.npz"))
-    assert (marked.song, marked.split) == (9, "odd")
+    assert (marked.song_id, marked.split) == (9, "odd")
     columns = episode.columns
     # A row's keys are answered by the next row's; goal and tips are those of its own clip.
     np.testing.assert_array_equal(columns["pressed"][:, 40], [0, 0, 1, 1, 0, 0])

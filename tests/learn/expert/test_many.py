@@ -67,10 +67,10 @@ def test_runs_are_no_songs(songs: Path, small_search: ExpertConfig) -> None:
     first = [row["song"] for row in train_experts(songs, out, small_search, jobs=2)]
     assert first == names
     (out / "half").mkdir()
-    (out / "half" / "song.npz").write_bytes((songs / "a.npz").read_bytes())
+    (out / "half" / "demonstration.npz").write_bytes((songs / "a.npz").read_bytes())
     assert list(find_experts_songs(songs, out)) == names
     # Results of another call.
-    (out / "half" / "song.npz").unlink()
+    (out / "half" / "demonstration.npz").unlink()
     assert list(find_experts_songs(songs, songs.parent)) == names
     with pytest.raises(InputError, match="name another folder"):
         train_experts(songs, songs, small_search)

@@ -67,7 +67,7 @@ def test_same_seed_same_expert_which_plays_what_was_measured(
     assert tensors_of(one) == tensors_of(same)
     assert tensors_of(one) != tensors_of(other)
     player, run = load_expert(tmp_path / "a")
-    metrics = player.play(run.song.score).metrics()
+    metrics = player.play(run.demonstration.score).metrics()
     best = run.best()[1]
     assert {name: best[name] for name in ("precision", "recall", "f1")} == {
         name: metrics[name] for name in ("precision", "recall", "f1")
@@ -130,7 +130,7 @@ def test_a_full_disk_leaves_the_last_good_checkpoint(
     assert train_expert(demo, out, longer, threads=1).steps_done == longer.total_steps
 
 
-@pytest.mark.parametrize("left", [(), ("run.json",), ("run.json", "song.npz")])
+@pytest.mark.parametrize("left", [(), ("run.json",), ("run.json", "demonstration.npz")])
 def test_a_run_that_was_killed_at_its_beginning_begins_anew(
     demo: Path,
     two_notes: Demonstration,
@@ -144,7 +144,7 @@ def test_a_run_that_was_killed_at_its_beginning_begins_anew(
     for name in left:
         (out / name).write_bytes((whole / name).read_bytes())
     # What a kill in the middle of writing a file leaves of it.
-    for name in (".song-a1b2c3", ".run-x_y_z0"):
+    for name in (".demonstration-a1b2c3", ".run-x_y_z0"):
         (out / name).mkdir()
         (out / name / "half").write_bytes(b"cut")
     again = train_expert(demo, out, small_search)
@@ -152,11 +152,11 @@ def test_a_run_that_was_killed_at_its_beginning_begins_anew(
     assert not [name for name in os.listdir(out) if name.startswith(".")]
     # A song of somebody else is no beginning.
     (tmp_path / "theirs").mkdir()
-    two_notes.save(tmp_path / "theirs" / "song.npz")
-    before = (tmp_path / "theirs" / "song.npz").read_bytes()
+    two_notes.save(tmp_path / "theirs" / "demonstration.npz")
+    before = (tmp_path / "theirs" / "demonstration.npz").read_bytes()
     with pytest.raises(InputError, match="something else"):
         train_expert(demo, tmp_path / "theirs", small_search)
-    assert (tmp_path / "theirs" / "song.npz").read_bytes() == before
+    assert (tmp_path / "theirs" / "demonstration.npz").read_bytes() == before
     # Also when it goes on; what is not ours stays.
     for name in (".state-0000", ".mine"):
         (out / name).mkdir()
@@ -226,7 +226,7 @@ def test_the_policy_works_the_pedal_when_it_plays(
     best, about = run.best()
     arrays = {name: array.copy() for name, array in best.items()}
     assert arrays["4.bias"].shape == (47,)
-    score = run.song.score
+    score = run.demonstration.score
     for sign in (1.0, -1.0):
         # The last layer alone says where the pedal is.
         arrays["4.weight"][46], arrays["4.bias"][46] = 0.0, sign
@@ -282,7 +282,7 @@ def test_learning_works(demo: Path, tmp_path: Path, method: str) -> None:
     steps = 18 * 464 if method == "ppo" else 3000
     config = ExpertConfig(method=method, total_steps=steps, env=env, ppo=ppo)  # type: ignore[arg-type]
     run = train_expert(demo, tmp_path / "run", config, threads=1)
-    silent = 1.0 - float(run.song.score.roll().any(axis=1).mean())
+    silent = 1.0 - float(run.demonstration.score.roll().any(axis=1).mean())
     if method == "ppo":
         assert run.curve()[0].recall == pytest.approx(silent)
     assert run.best()[1]["recall"] > silent + 0.3

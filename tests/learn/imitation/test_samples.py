@@ -144,11 +144,11 @@ def test_the_same_seed_draws_the_same(clips, name):
 
 
 def test_no_song_is_on_both_sides_of_the_split(clips):
-    many = replace(clips, song=np.array([1, 1, 2]))
+    many = replace(clips, song_id=np.array([1, 1, 2]))
     learned, held = many.split()
     assert len(learned)
     assert len(held)
-    assert not set(learned.song.tolist()) & set(held.song.tolist())
+    assert not set(learned.song_id.tolist()) & set(held.song_id.tolist())
     assert len(learned) + len(held) == 3
 
 
@@ -160,7 +160,7 @@ def test_a_song_is_kept_whatever_else_there_is(clips):
             np.array(songs),
             ["a clip"] * len(songs),
         )
-        return set(many.split()[1].song.tolist())
+        return set(many.split()[1].song_id.tolist())
 
     every = kept(range(400))
     assert 15 < len(every) < 60

@@ -32,7 +32,7 @@ def data(two_notes: Demonstration, tmp_path_factory: pytest.TempPathFactory) -> 
     demos.mkdir()
     songs.mkdir()
     for number in range(15):
-        replace(two_notes, song=number).save(demos / f"{number:02d}.npz")
+        replace(two_notes, song_id=number).save(demos / f"{number:02d}.npz")
     for number in range(2):
         moved = replace(two_notes.score, key=two_notes.score.key + number)
         moved.to_midi(songs / f"{number}.mid")

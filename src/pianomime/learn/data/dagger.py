@@ -83,7 +83,7 @@ def collect_dagger_episode(
     columns = record(controller, IkTracker().start(plan), score)
     columns["action"][:] = controller.labels
     f1 = fill_columns(columns, score.roll(), plan.fingertips, plan.finger_key)
-    return Episode(score.title, f1, "ik", columns, demonstration.song)
+    return Episode(score.title, f1, "ik", columns, demonstration.song_id)
 
 
 class _DaggerController:

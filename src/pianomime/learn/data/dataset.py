@@ -41,13 +41,13 @@ class Dataset:
     Attributes:
         columns: arrays (T, ...) by name.
         ends: (N,) one past the last frame of each clip.
-        song: (N,) number that clips of one song share.
+        song_id: (N,) number that clips of one song share.
         name: N names of the clips.
     """
 
     columns: dict[str, NDArray[Any]]
     ends: NDArray[np.int64]
-    song: NDArray[np.int64]
+    song_id: NDArray[np.int64]
     name: list[str]
 
     def __len__(self) -> int:
@@ -66,13 +66,13 @@ class Dataset:
         return Dataset(
             {name: array[rows] for name, array in self.columns.items()},
             np.cumsum(lengths[mask]),
-            self.song[mask],
+            self.song_id[mask],
             [name for name, kept in zip(self.name, mask, strict=True) if kept],
         )
 
     def digest(self) -> str:
         """Hash that identifies the data."""
-        description = [self.name, self.ends.tolist(), self.song.tolist()]
+        description = [self.name, self.ends.tolist(), self.song_id.tolist()]
         digest = hashlib.sha256(json.dumps(description).encode())
         for name in sorted(self.columns):
             digest.update(np.ascontiguousarray(self.columns[name]).data)
@@ -83,7 +83,7 @@ class Dataset:
 
         Which songs are kept for validation does not depend on what else is in the data set.
         """
-        validation = _is_validation(self.song)
+        validation = _is_validation(self.song_id)
         return self.subset(~validation), self.subset(validation)
 
 
@@ -110,7 +110,7 @@ def read_demonstrations(source: Path) -> list[Demonstration]:
 
 def validation_demonstrations(demonstrations: Sequence[Demonstration]) -> list[Demonstration]:
     """The demonstrations of songs that `Dataset.split` keeps for validation."""
-    songs = np.array([_song_number(one.song, one.score.title) for one in demonstrations])
+    songs = np.array([_song_number(one.song_id, one.score.title) for one in demonstrations])
     mask = _is_validation(songs)
     return [one for one, kept in zip(demonstrations, mask, strict=True) if kept]
 
@@ -140,7 +140,7 @@ def demonstration_dataset(source: Path) -> Dataset:
         (
             (
                 one.score.title,
-                _song_number(one.song, one.score.title),
+                _song_number(one.song_id, one.score.title),
                 {
                     "goal": one.score.roll(),
                     "fingertips": one.plan.fingertips.astype(np.float32),
@@ -177,7 +177,7 @@ def trajectory_dataset(
                             f"{source}: {episode['name']} has the base controller "
                             f"{episode['base']}; this policy needs {base}"
                         )
-                    song = _song_number(episode["song"], episode["name"])
+                    song = _song_number(episode["song_id"], episode["name"])
                     yield episode["name"], song, data.columns(number, columns)
 
     return _concatenate(", ".join(map(str, sources)), clips())

@@ -28,7 +28,7 @@ class Episode:
         f1: frame-wise F1 of the whole episode.
         base: the base controller of `base_control`, "ik" or "dynamic".
         columns: arrays (T, ...) by the names in `COLUMNS`.
-        song: number that episodes of one song share; -1 if unknown.
+        song_id: number that episodes of one song share; -1 if unknown.
         split: part of the data set that it belongs to; only "train" is for training.
     """
 
@@ -36,7 +36,7 @@ class Episode:
     f1: float
     base: str
     columns: dict[str, NDArray[Any]]
-    song: int = -1
+    song_id: int = -1
     split: str = "train"
 
 
@@ -95,11 +95,21 @@ def play_episode(run: ExpertRun) -> Episode:
     from pianomime.learn.envs.batch import base_controller
     from pianomime.learn.expert.expert import expert_tracker
 
-    song, env = run.song, run.config.env
-    controller, base = expert_tracker(run).start(song.plan), base_controller(env, song.plan)
-    columns = record(controller, base, song.score)
-    f1 = fill_columns(columns, song.score.roll(), song.plan.fingertips, song.plan.finger_key)
-    return Episode(song.score.title, f1, env.base, columns, song.song, song.split)
+    demonstration, env = run.demonstration, run.config.env
+    controller, base = (
+        expert_tracker(run).start(demonstration.plan),
+        base_controller(env, demonstration.plan),
+    )
+    columns = record(controller, base, demonstration.score)
+    f1 = fill_columns(
+        columns,
+        demonstration.score.roll(),
+        demonstration.plan.fingertips,
+        demonstration.plan.finger_key,
+    )
+    return Episode(
+        demonstration.score.title, f1, env.base, columns, demonstration.song_id, demonstration.split
+    )
 
 
 def record(controller: Controller, base: Controller, score: Score) -> dict[str, NDArray[Any]]:

@@ -69,7 +69,7 @@ def read_published(source: Path, limit: int | None = None) -> Iterator[tuple[Dem
     total = len(clips) if limit is None else min(limit, len(clips))
     for clip, name in zip(clips[:total], names, strict=False):
         made = demonstration_of(clip.fingertips, clip.goal, name, source.name)
-        yield replace(made, song=clip.song, split=clip.split), total
+        yield replace(made, song_id=clip.song_id, split=clip.split), total
 
 
 def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Episode, int]]:
@@ -284,7 +284,7 @@ class _Clip:
 
     fingertips: NDArray[np.float64]
     goal: NDArray[np.bool_] | None
-    song: int = -1
+    song_id: int = -1
     split: str = TRAIN
 
 

@@ -34,7 +34,7 @@ FORMAT = "pianomime experts"
 VERSION = 3
 _CHUNK = 4096
 """Rows in a chunk of the file."""
-_EPISODE = {"name", "f1", "base", "song", "split"}
+_EPISODE = {"name", "f1", "base", "song_id", "split"}
 """What is recorded of each episode."""
 
 
@@ -77,7 +77,7 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
                     "name": episode.name,
                     "f1": episode.f1,
                     "base": episode.base,
-                    "song": episode.song,
+                    "song_id": episode.song_id,
                     "split": episode.split,
                 }
             )
@@ -106,7 +106,7 @@ class TrajectoryData:
     Attributes:
         group: the zarr group.
         ends: (E,) one past the last row of each episode.
-        episodes: name, f1, base, song and split of each, see `Episode`.
+        episodes: name, f1, base, song_id and split of each, see `Episode`.
     """
 
     group: zarr.Group
@@ -177,7 +177,7 @@ class TrajectoryData:
             facts["f1"],
             facts["base"],
             self.columns(number, COLUMNS),
-            facts["song"],
+            facts["song_id"],
             facts["split"],
         )
 

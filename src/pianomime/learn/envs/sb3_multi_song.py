@@ -17,7 +17,7 @@ from pianomime.learn.runs.safetensors_file import Arrays
 from pianomime.world import WorldBatch
 
 
-class Song(Protocol):
+class SongGoals(Protocol):
     """What is played, frame by frame."""
 
     @property
@@ -66,7 +66,7 @@ class Sb3MultiSongEnv(Sb3BaseEnv):
 
     def __init__(
         self,
-        songs: Sequence[Song],
+        songs: Sequence[SongGoals],
         num_worlds: int,
         agents: int,
         observation_size: int,

@@ -67,7 +67,7 @@ def load_expert(path: Path) -> tuple[Player, ExpertRun]:
     """
     run = ExpertRun.load(path)
     excerpt = run.start, run.seconds
-    planner, tracker = DemonstrationPlanner(run.song), expert_tracker(run)
+    planner, tracker = DemonstrationPlanner(run.demonstration), expert_tracker(run)
     return PlannedPlayer("expert", planner, tracker, excerpt=excerpt), run
 
 
@@ -97,7 +97,10 @@ def expert_tracker(run: ExpertRun) -> Tracker:
     if run.config.method == "ppo":
         from pianomime.learn.expert.residual_policy import ResidualPolicyTracker
 
-        return ResidualPolicyTracker.from_arrays(run.song, run.config, arrays)
-    if "ctrl" not in arrays or arrays["ctrl"].shape != (len(run.song.plan), LAYOUT.ctrl_size):
+        return ResidualPolicyTracker.from_arrays(run.demonstration, run.config, arrays)
+    if "ctrl" not in arrays or arrays["ctrl"].shape != (
+        len(run.demonstration.plan),
+        LAYOUT.ctrl_size,
+    ):
         raise InputError(f"{run.path}: the expert's controls do not fit its song")
     return ReplayTracker(arrays["ctrl"])

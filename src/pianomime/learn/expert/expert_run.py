@@ -19,7 +19,7 @@ from pianomime.learn.runs.safetensors_file import Arrays
 from pianomime.plan.demonstration import Demonstration
 
 _KIND = "expert"
-_SONG = "song.npz"
+_DEMONSTRATION = "demonstration.npz"
 _CURVE = "curve.json"
 _EXCERPT = "excerpt"
 """Name, in the run's config, of what is known of the demonstration."""
@@ -48,13 +48,13 @@ class ExpertRun:
 
     Attributes:
         folder: its files.
-        song: the excerpt of the demonstration that it is trained on.
+        demonstration: the excerpt of the demonstration that it is trained on.
         config: how it is trained.
         start, seconds: where the excerpt begins, and its length at most [s].
     """
 
     folder: RunFolder
-    song: Demonstration
+    demonstration: Demonstration
     config: ExpertConfig
     start: float
     seconds: float
@@ -62,7 +62,12 @@ class ExpertRun:
     @classmethod
     @contextmanager
     def open(
-        cls, path: Path, song: Demonstration, config: ExpertConfig, start: float, seconds: float
+        cls,
+        path: Path,
+        demonstration: Demonstration,
+        config: ExpertConfig,
+        start: float,
+        seconds: float,
     ) -> Iterator[ExpertRun]:
         """Begin a run, or resume one of the same demonstration and config; it is locked meanwhile.
 
@@ -73,20 +78,20 @@ class ExpertRun:
             OSError: it cannot be written.
         """
         excerpt = {
-            "title": song.score.title,
+            "title": demonstration.score.title,
             "start": start,
             "seconds": seconds,
-            "digest": _digest(song),
+            "digest": _digest(demonstration),
         }
         if is_run(path):
             there = RunFolder.load(path).config.get(_EXCERPT)
             if isinstance(there, dict) and there.get("digest") != excerpt["digest"]:
                 raise InputError(f"{path}: holds a run on another song, {there.get('title')}")
         content = {_EXCERPT: excerpt, **to_json(config)}
-        with RunFolder.open(path, _KIND, content, _MAY_DIFFER, (_SONG, _CURVE)) as folder:
-            if not (path / _SONG).exists():
-                song.save(path / _SONG)
-            yield cls(folder, song, config, start, seconds)
+        with RunFolder.open(path, _KIND, content, _MAY_DIFFER, (_DEMONSTRATION, _CURVE)) as folder:
+            if not (path / _DEMONSTRATION).exists():
+                demonstration.save(path / _DEMONSTRATION)
+            yield cls(folder, demonstration, config, start, seconds)
 
     @classmethod
     def load(cls, path: Path) -> ExpertRun:
@@ -108,9 +113,9 @@ class ExpertRun:
             config = from_json(ExpertConfig, content)
         except (KeyError, ValueError, TypeError) as error:
             raise InputError(f"{path}: its config cannot be read ({error})") from error
-        if not (path / _SONG).exists():
+        if not (path / _DEMONSTRATION).exists():
             raise InputError(f"{path}: nothing was trained in this run yet")
-        return cls(folder, Demonstration.load(path / _SONG), config, start, seconds)
+        return cls(folder, Demonstration.load(path / _DEMONSTRATION), config, start, seconds)
 
     @property
     def path(self) -> Path:
@@ -195,10 +200,14 @@ def find_expert_runs(path: Path) -> list[Path]:
     return found
 
 
-def _digest(song: Demonstration) -> str:
+def _digest(demonstration: Demonstration) -> str:
     """Hash of what an expert is trained on: the plan, and the keys that should be down."""
     digest = hashlib.sha256()
-    for array in (song.plan.fingertips, song.plan.finger_key, song.score.roll()):
+    for array in (
+        demonstration.plan.fingertips,
+        demonstration.plan.finger_key,
+        demonstration.score.roll(),
+    ):
         digest.update(f"{array.dtype} {array.shape} ".encode())
         digest.update(array.tobytes())
     return digest.hexdigest()[:16]

@@ -43,7 +43,7 @@ def train_ppo(run: ExpertRun, threads: int, progress: Progress) -> None:
         OSError: a checkpoint cannot be written; the one before stays.
     """
     settings = run.config.ppo
-    env = Sb3Env(SongBatch(run.song, run.config.env, settings.num_envs, threads))
+    env = Sb3Env(SongBatch(run.demonstration, run.config.env, settings.num_envs, threads))
     model = make_model(env, settings, run.config.seed, threads)
     model.set_logger(configure(str(run.tensorboard), ["tensorboard"]))
     callback = _ExpertCallback(run, env, progress)
@@ -133,10 +133,12 @@ class _ExpertCallback(ResumableCallback):
 
     def _evaluate(self, steps: int) -> None:
         weights = _actor_arrays(self.model)
-        tracker = ResidualPolicyTracker.from_arrays(self._run.song, self._run.config, weights)
-        player = PlannedPlayer("expert", DemonstrationPlanner(self._run.song), tracker)
+        tracker = ResidualPolicyTracker.from_arrays(
+            self._run.demonstration, self._run.config, weights
+        )
+        player = PlannedPlayer("expert", DemonstrationPlanner(self._run.demonstration), tracker)
         with torch_threads(1):
-            metrics = player.play(self._run.song.score).metrics()
+            metrics = player.play(self._run.demonstration.score).metrics()
         made = Evaluation(steps, metrics["precision"], metrics["recall"], metrics["f1"])
         if made.f1 > max((one.f1 for one in self.curve), default=-1.0):
             self._run.keep_best(weights, made)

@@ -106,8 +106,10 @@ class _PassPlayer(Player):
     ) -> None:
         inner: Tracker = base_tracker(run.config.env) if ctrl is None else ReplayTracker(ctrl)
         config = pass_config(run.config.search, number, run.config.seed)
-        self._tracker = PredictiveSamplingTracker(inner, config, run.song.score.roll(), threads)
-        self._plan = run.song.plan
+        self._tracker = PredictiveSamplingTracker(
+            inner, config, run.demonstration.score.roll(), threads
+        )
+        self._plan = run.demonstration.plan
         self._controller: PredictiveSamplingController | None = None
 
     @property
@@ -135,7 +137,7 @@ def _play(
         spent = min(steps + player.steps + done, run.config.total_steps)
         progress("training", spent, run.config.total_steps, shown)
 
-    return player.play(run.song.score, passed_on)
+    return player.play(run.demonstration.score, passed_on)
 
 
 def _scores(played: Performance) -> dict[str, float]:

@@ -70,7 +70,7 @@ def train_policy(
         from pianomime.learn.goal.training import load_encoder
 
         encoder = load_encoder(goal)
-    if len(set(dataset.song.tolist())) < 2:
+    if len(set(dataset.song_id.tolist())) < 2:
         raise InputError("two songs at least are needed, one of them for validation")
     train, validation = (Samples.of(part, config) for part in dataset.split())
     seed = config.trainer.seed
