@@ -5,10 +5,12 @@ Made anew by `python benchmarks/digest.py --write`.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from common import ROOT
 from pianomime import Score, World, excerpt, songs
@@ -16,12 +18,17 @@ from pianomime.archive import write_arrays
 from pianomime.files import atomic
 from pianomime.plan import ZeroShotPlanner
 from pianomime.plan.fingering import find_fingering
+from pianomime.plan.hand_path import make_feasible
+from pianomime.plan.joint_path import smooth_path
 from pianomime.players import rollout
 from pianomime.track import DynamicTracker, IkTracker
+from pianomime.world.hand import Hand
 
 FINGERINGS = ROOT / "tests" / "plan" / "fingerings.npz"
 CONTROLS = ROOT / "tests" / "track" / "controls.npz"
 SONG, SECONDS = "beethoven-fur-elise", 4.0
+HUMAN = np.array([0.01, -0.004, 0.02])
+"""[m] How far the fingertips of a made-up human are from the robot's."""
 
 
 def write_plans() -> None:
@@ -45,6 +52,7 @@ def write_plans() -> None:
     rest = world.qpos.copy()
     after = [world.qpos.copy() for _ in rollout(controller, world, score.pedal_roll())]
     frames, qpos = np.arange(len(plan)), np.array([rest, *after[:-1]])
+    human = make_feasible(replace(plan, fingertips=plan.fingertips + HUMAN))
     _write(
         CONTROLS,
         {
@@ -53,8 +61,18 @@ def write_plans() -> None:
             "qpos": qpos,
             "dynamic": controller.controls(frames, qpos)[0],
             "ik": IkTracker().start(plan).controls(frames, qpos)[0],
+            "path": right_path(plan.fingertips),
+            "feasible": human.fingertips,
         },
     )
+
+
+def right_path(fingertips: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T + 1, 27) Joints of the right hand that follows points (T, 2, 6, 3), as they are set."""
+    points = fingertips[:, 1] + [0.0, 0.0, 0.03]
+    clearance = np.full((len(points), 5), 0.01)
+    weights = np.full(points.shape, 250.0)
+    return smooth_path(Hand("rh"), np.zeros(27), points, weights, clearance)
 
 
 def _dense(seed: int) -> Score:

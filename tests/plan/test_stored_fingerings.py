@@ -11,8 +11,11 @@ import numpy as np
 import pytest
 
 from pianomime import Score, excerpt, songs
-from pianomime.plan import ZeroShotPlanner
+from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.plan.fingering import find_fingering
+from pianomime.plan.hand_path import make_feasible
+from pianomime.plan.joint_path import smooth_path
+from pianomime.world.hand import Hand
 
 STORED = Path(__file__).with_name("fingerings.npz")
 NAMES = sorted({name.partition(":")[0] for name in np.load(STORED).files})
@@ -53,3 +56,21 @@ def test_the_hand_paths_are_the_stored_ones() -> None:
     plan = ZeroShotPlanner().plan(score)
     np.testing.assert_array_equal(plan.finger_key, stored["finger_key"])
     np.testing.assert_allclose(plan.fingertips, stored["fingertips"], atol=1e-6)
+
+
+def test_the_joint_path_is_the_stored_one() -> None:
+    """With the weights that the dynamic tracker leaves as they are."""
+    stored = np.load(STORED.parents[1] / "track" / "controls.npz")
+    points = stored["fingertips"][:, 1] + [0.0, 0.0, 0.03]
+    clearance = np.full((len(points), 5), 0.01)
+    weights = np.full(points.shape, 250.0)
+    path = smooth_path(Hand("rh"), np.zeros(27), points, weights, clearance)
+    np.testing.assert_allclose(path, stored["path"], atol=1e-6)
+
+
+def test_a_humans_plan_becomes_the_stored_one() -> None:
+    stored = np.load(STORED.parents[1] / "track" / "controls.npz")
+    fingertips = stored["fingertips"] + [0.01, -0.004, 0.02]
+    nobody = np.empty(0, np.int8)
+    human = FingertipPlan(fingertips, stored["finger_key"], nobody, nobody)
+    np.testing.assert_allclose(make_feasible(human).fingertips, stored["feasible"], atol=1e-6)
