@@ -176,8 +176,8 @@ def test_wrong_usage_is_one_line_with_a_hint(
 
 
 def test_a_song_with_no_name_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "no name" in fails(["play", ""], capsys)
-    assert "no name" in fails(["evaluate", "ode-to-joy", " "], capsys)
+    assert "name of a song is empty" in fails(["play", ""], capsys)
+    assert "name of a song is empty" in fails(["evaluate", "ode-to-joy", " "], capsys)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there are no such pipes on Windows")

@@ -19,6 +19,7 @@ from pianomime.plan.fingering_cost import (
     Struck,
     chord_cost,
     hand_cost,
+    pair_cost,
 )
 from pianomime.plan.reach import EASE, stretch
 from pianomime.world.parameters import key_centres
@@ -244,3 +245,11 @@ def test_the_value_of_a_key_is_its_share_of_the_recall() -> None:
     value = np.diff(frame_values(score))
     np.testing.assert_allclose(value[:6], [1, 1, 1 / 4, 1 / 4, 1 / 3, 1])
     assert len(value) == score.frames() + 5
+
+
+def test_out_of_reach_is_out_of_reach_at_any_price() -> None:
+    """Also where stretched fingers cost nothing."""
+    free, usual = pair_cost(RIGHT, 0.0, 0.0), pair_cost(RIGHT, 1.0, 4.0)
+    np.testing.assert_array_equal(np.isinf(free), np.isinf(usual))
+    assert np.isinf(usual).any()
+    assert not np.isnan(free).any()

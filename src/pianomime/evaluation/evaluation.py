@@ -282,8 +282,8 @@ def _program_hash() -> str:
     for library in _LIBRARIES:
         with contextlib.suppress(PackageNotFoundError):  # Not all are in every installation.
             digest.update(f"{library} {version(library)} ".encode())
-    files = sorted(Path(pianomime.__file__).parent.rglob("*"))
-    digest.update(
-        files_digest([file for file in files if file.suffix in (".py", ".json")]).encode()
-    )
+    room = Path(pianomime.__file__).parent
+    ours = sorted(file for file in room.rglob("*") if file.suffix in (".py", ".json"))
+    digest.update(" ".join(file.relative_to(room).as_posix() for file in ours).encode())
+    digest.update(files_digest(ours).encode())
     return digest.hexdigest()

@@ -158,8 +158,9 @@ def pair_cost(side: int, strain: float, limit: float) -> NDArray[np.float64]:
         limit: factor of its fourth power.
     """
     share = stretch(side)
-    cost: NDArray[np.float64] = strain * share**2 + limit * share**4
-    return cost
+    within_reach = np.where(np.isinf(share), 0.0, share)
+    cost = strain * within_reach**2 + limit * within_reach**4
+    return np.where(np.isinf(share), np.inf, cost)
 
 
 def hand_cost(

@@ -1,4 +1,4 @@
-"""The one loop in which a controller meets a World."""
+"""The one loop in which a controller acts on a World."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Controllers: what meets the World. All state of a performance that is being played is in one."""
+"""Controllers: they give the controls of one performance, and hold all its state."""
 
 from __future__ import annotations
 
