@@ -116,7 +116,7 @@ def main():
     elif command == "test":
         set_up("dev")
         os.chdir(ROOT)
-        run([PYTHON, "-m", "pytest", "-n", "2", "--dist", "worksteal"] + rest)
+        run([PYTHON, "-m", "pytest", "-n", "2"] + rest)
     elif command == "lint":
         set_up("dev")
         os.chdir(ROOT)

@@ -202,6 +202,8 @@ def test_what_was_trained_plays_and_is_taken_as_it_is(songs, two_notes, tmp_path
 def test_a_training_that_was_stopped_comes_to_the_same(songs, tmp_path, monkeypatch):
     from pianomime.learn.fingers import training
 
+    # Other tests in this process, such as those of Ray, may have left threads behind.
+    before = threading.active_count()
     monkeypatch.setattr(training, "_CHECKPOINT_UPDATES", 1)
     whole, _ = train_fingers([songs], tmp_path / "whole", SMALL, 1)
 
@@ -223,7 +225,7 @@ def test_a_training_that_was_stopped_comes_to_the_same(songs, tmp_path, monkeypa
     for name, array in one.items():
         np.testing.assert_array_equal(array, other[name])
     assert whole.exists()
-    assert threading.active_count() < 20
+    assert threading.active_count() <= before + 2
 
 
 def test_the_file_acts_as_the_network_does(songs, tmp_path):
