@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from contextlib import nullcontext
 from functools import cache, partial
 from importlib.metadata import entry_points
@@ -117,7 +118,7 @@ def player_files(source: str | Path) -> list[Path]:
     Raises:
         InputError: there is no such player, or one of its files is not there.
     """
-    return _find(source)[1]
+    return _find(source)[1]()
 
 
 def player_settings(name: str) -> dict[str, Any]:
@@ -134,35 +135,38 @@ def player_settings(name: str) -> dict[str, Any]:
     return settings_of(**SETTINGS.get(name, {}))
 
 
-def _find(source: str | Path) -> tuple[PlayerFactory, list[Path]]:
-    """What makes a player, and the files that decide how it plays."""
+_Found = tuple[PlayerFactory, Callable[[], list[Path]]]
+"""What makes a player, and what finds the files that decide how it plays, which few ask for."""
+
+
+def _find(source: str | Path) -> _Found:
     name = str(source)
     if name in _registered:
-        return _registered[name], []
+        return _registered[name], list
     if name in FACTORIES:
-        return FACTORIES[name], weight_files(name) if name in METHODS else []
+        return FACTORIES[name], partial(weight_files, name) if name in METHODS else list
     if name in _entry_points():
         place = _entry_points()[name]
-        return import_factory(place), plugin_files(place)
+        return import_factory(place), partial(plugin_files, place)
     path = Path(name)
     if path.suffix == ".npz":
         if not path.is_file():
             raise InputError(f"{name}: no such demonstration")
-        return partial(FACTORIES["demonstration"], demonstration=path), [path]
+        return partial(FACTORIES["demonstration"], demonstration=path), lambda: [path]
     if path.is_dir():
         return _of_folder(path)
     if path.name in METHODS and any(path.parent.glob("*.onnx")):
         return _of_weights(path.name, path.parent)
     if ":" in name:
-        return import_factory(name), plugin_files(name)
+        return import_factory(name), partial(plugin_files, name)
     raise unknown_name("player", name, player_names())
 
 
-def _of_folder(path: Path) -> tuple[PlayerFactory, list[Path]]:
+def _of_folder(path: Path) -> _Found:
     if (path / RUN_FILE).is_file():
         # What plays experts stands above this room, and announces itself as others do.
         factory = partial(import_factory(_entry_points()[EXPERT]), run=path)
-        return factory, sorted(file for file in path.iterdir() if file.is_file())
+        return factory, lambda: sorted(file for file in path.iterdir() if file.is_file())
     there = {file.stem for file in path.glob("*.onnx")}
     whole = [method for method, policies in METHODS.items() if there.issuperset(policies)]
     if not whole:
@@ -173,8 +177,8 @@ def _of_folder(path: Path) -> tuple[PlayerFactory, list[Path]]:
     return _of_weights(whole[0], path)
 
 
-def _of_weights(method: str, weights: Path) -> tuple[PlayerFactory, list[Path]]:
-    return partial(FACTORIES[method], weights=weights), weight_files(method, weights)
+def _of_weights(method: str, weights: Path) -> _Found:
+    return partial(FACTORIES[method], weights=weights), partial(weight_files, method, weights)
 
 
 @cache
