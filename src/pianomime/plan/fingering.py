@@ -27,6 +27,7 @@ from pianomime.plan.fingering_cost import (
     hand_cost,
 )
 from pianomime.plan.fingertip_plan import LEFT, RIGHT
+from pianomime.progress import Steps
 from pianomime.world.layout import FINGER_COUNT
 
 _MOST_DROPPED = {7: 4, 8: 4, 9: 3, 10: 3}
@@ -82,7 +83,9 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     history = []
     onsets, event = np.unique(frames[:, 0], return_inverse=True)
     groups = np.split(np.argsort(event, kind="stable"), np.cumsum(np.bincount(event))[:-1])
+    steps = Steps("fingering", len(onsets))
     for onset, group in zip(onsets, groups, strict=True):
+        steps.advance(1)
         # Where two voices strike the same key at once, one finger plays both.
         keys, voice = np.unique(score.key[group], return_inverse=True)
         # A note that covers no frame is fingered as if it had one.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import BLACK, NO_KEY
 from pianomime.plan.fingertip_plan import FingertipPlan
 from pianomime.plan.joint_path import KEY_REST, PathConfig, smooth_path
+from pianomime.progress import Steps
 from pianomime.validation import above_zero, finite
 from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
@@ -77,6 +78,7 @@ def hand_paths(
     """
     config = config or HandPathConfig()
     fingertips = np.empty((len(finger_key), 2, POINT_COUNT, 3))
+    steps = Steps("hand paths", len(SIDES) * config.path.iterations * len(finger_key))
     for index, side in enumerate(SIDES):
         hand = Hand(side)
         targets, weights, clearance = _targets(finger_key[:, index], config)
@@ -88,9 +90,16 @@ def hand_paths(
             targets[:, 0] = others[:, index, 0]
             weights[:, 0, 1] = 1 / config.alike_wrist
         path = smooth_path(
-            hand, np.zeros(LAYOUT.hand_joints), targets, weights, clearance, config.path
+            hand,
+            np.zeros(LAYOUT.hand_joints),
+            targets,
+            weights,
+            clearance,
+            config.path,
+            steps.advance,
         )
-        fingertips[:, index] = [hand.points(pose) for pose in path[1:]]
+        for frame, pose in enumerate(path[1:]):
+            fingertips[frame, index] = hand.points(pose)
         fingertips[:, index, 1:, 2][finger_key[:, index] >= 0] = 0.0
     return fingertips
 

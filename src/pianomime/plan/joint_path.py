@@ -3,18 +3,21 @@
 One damped Gauss-Newton problem over all frames of a piece: squared tracking errors and squared
 accelerations are minimised together. A hand therefore starts moving before a leap, and fingers
 that do not play stay out of the way. Each step is one banded Cholesky solve, so the time grows
-linearly with the length of the piece.
+linearly with the length of the piece. So does the memory, but only by the lower triangle of one
+27 x 27 block a frame: 220 MB for an hour.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
 
 from pianomime.keyboard import BLACK, FRAME_SECONDS
+from pianomime.plan.band_solve import solve_in_windows
+from pianomime.progress import ignore
 from pianomime.validation import above_zero
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
@@ -45,6 +48,20 @@ KEY_REST = np.where(BLACK, BLACK_REST, WHITE_REST)
 
 _HELD = 1e9
 """Stiffness that keeps a joint at its limit during one step."""
+
+_WINDOW = 1000
+"""Frames whose matrices are in memory as a whole; excerpts of less than 50 s fit in one window."""
+_TRIANGLE = [
+    np.arange(LAYOUT.hand_joints - below) * (LAYOUT.hand_joints + 1) + below * LAYOUT.hand_joints
+    for below in range(LAYOUT.hand_joints)
+]
+"""Places of the diagonal of a 27 x 27 block, and of each line below it, in the flat block."""
+_STORED = np.concatenate(_TRIANGLE)
+"""(378,) What is stored of a block, which is symmetric."""
+_LINES = np.split(np.arange(len(_STORED)), np.cumsum([len(line) for line in _TRIANGLE])[:-1])
+"""Places of the same lines in what is stored."""
+_BANDS = 2 * LAYOUT.hand_joints
+"""Bands below the diagonal of the matrix of a step."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +99,7 @@ def smooth_path(
     weights: NDArray[np.float64],
     clearance: NDArray[np.float64],
     config: PathConfig | None = None,
+    advance: Callable[[int], None] = ignore,
 ) -> NDArray[np.float64]:
     """Optimise the joint positions of one hand at the end of each of T frames.
 
@@ -94,6 +112,7 @@ def smooth_path(
         clearance: (T, 5) least height of each fingertip above the keys [m]; NaN for fingers
             that may go down.
         config: weights of the other terms.
+        advance: called with a number of frames as they are done, `iterations` times T in all.
 
     Returns:
         (T + 1, 27) joint positions [rad, m]; the first row is `start`.
@@ -106,29 +125,50 @@ def smooth_path(
     home = np.clip(HOME, hand.low, hand.high)
     path = np.tile(home, (frames, 1))
     path[:, LAYOUT.slide] = _slide_guess(hand, targets, weights)
-    damping = config.damping**-2
+    everywhere = np.diag(posture + config.damping**-2) + coupling
+    blocks = np.empty((frames, len(_STORED)))
     for _ in range(config.iterations):
         gradient = np.empty((frames, LAYOUT.hand_joints))
-        blocks = np.empty((frames, LAYOUT.hand_joints, LAYOUT.hand_joints))
-        for frame in range(frames):
-            points, jacobian = hand.points_and_jacobian(path[frame])
-            error = (points - targets[frame]) * weights[frame]
-            rows = jacobian * weights[frame][..., None]
-            height = points[1:, 2] - clearance[frame] - resting_height(points[1:, 0])
-            below = height < 0.0
-            error[1:, 2][below] = height[below] / config.floor
-            rows[1:, 2][below] = jacobian[1:, 2][below] / config.floor
-            rows = rows.reshape(-1, LAYOUT.hand_joints)
-            blocks[frame] = rows.T @ rows
-            gradient[frame] = rows.T @ error.ravel()
+        for first in range(0, frames, _WINDOW):
+            here = slice(first, min(first + _WINDOW, frames))
+            whole, gradient[here] = _tracking_terms(
+                hand, path[here], targets[here], weights[here], clearance[here], config
+            )
+            whole += everywhere
+            blocks[here] = whole.reshape(len(whole), -1)[:, _STORED]
+            advance(len(whole))
         gradient += posture * (path - home) + path @ coupling
-        blocks += np.diag(posture + damping) + coupling
         # A joint that is pushed against its limit stays there for this step.
         held = ((path <= hand.low) & (gradient > 0)) | ((path >= hand.high) & (gradient < 0))
-        blocks[:, np.arange(LAYOUT.hand_joints), np.arange(LAYOUT.hand_joints)] += held * _HELD
+        blocks[:, _LINES[0]] += held * _HELD
         step = _step(blocks, gradient, stiffness, path, start)
         path = np.clip(path + np.clip(step, -config.step, config.step), hand.low, hand.high)
     return np.vstack([start, path])
+
+
+def _tracking_terms(
+    hand: Hand,
+    path: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    clearance: NDArray[np.float64],
+    config: PathConfig,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Hessian (T, 27, 27) and gradient (T, 27) of the squared errors of the points of a hand."""
+    gradient = np.empty((len(path), LAYOUT.hand_joints))
+    blocks = np.empty((len(path), LAYOUT.hand_joints, LAYOUT.hand_joints))
+    for frame, pose in enumerate(path):
+        points, jacobian = hand.points_and_jacobian(pose)
+        error = (points - targets[frame]) * weights[frame]
+        rows = jacobian * weights[frame][..., None]
+        height = points[1:, 2] - clearance[frame] - resting_height(points[1:, 0])
+        below = height < 0.0
+        error[1:, 2][below] = height[below] / config.floor
+        rows[1:, 2][below] = jacobian[1:, 2][below] / config.floor
+        rows = rows.reshape(-1, LAYOUT.hand_joints)
+        blocks[frame] = rows.T @ rows
+        gradient[frame] = rows.T @ error.ravel()
+    return blocks, gradient
 
 
 def resting_height(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -201,26 +241,33 @@ def _step(
 
     Second differences couple each joint with itself up to two frames away, so the matrix has
     2 x 27 bands below its diagonal.
+
+    Args:
+        blocks: (T, 378) the lower triangles of the blocks on its diagonal, as in `_STORED`, without
+            the second differences.
+        gradient: (T, 27) likewise.
+        stiffness: (27,) weight of the second differences.
+        path: (T, 27) where the step begins [rad, m].
+        start: (27,) before that path [rad, m].
     """
     frames = len(path)
     # The hand starts from rest: in both frames before the first it is at the start.
     second = np.diff(np.vstack([start, start, path]), n=2, axis=0)
     second = np.vstack([second, np.zeros((2, LAYOUT.hand_joints))])
     gradient = gradient + stiffness * (second[:-2] - 2.0 * second[1:-1] + second[2:])
-    band = np.zeros((2 * LAYOUT.hand_joints + 1, frames, LAYOUT.hand_joints))
-    for below in range(LAYOUT.hand_joints):
-        column = np.arange(LAYOUT.hand_joints - below)
-        band[below][:, column] = blocks[:, column + below, column]
-    # A frame is in its own second difference and, except the last two, in those of the next two.
-    later, latest = ((np.arange(frames) < frames - lag)[:, None] for lag in (1, 2))
-    ties = (1.0 + 4.0 * later + latest, -2.0 * later - 2.0 * latest, 1.0 * latest)
-    for lag in range(3):
-        band[lag * LAYOUT.hand_joints] += ties[lag] * stiffness
-    step: NDArray[np.float64] = solveh_banded(
-        band.reshape(2 * LAYOUT.hand_joints + 1, -1),
-        -gradient.ravel(),
-        lower=True,
-        overwrite_ab=True,
-        check_finite=False,
-    )
+
+    def columns(first: int, stop: int) -> NDArray[np.float64]:
+        here = np.arange(first // LAYOUT.hand_joints, stop // LAYOUT.hand_joints)
+        band = np.zeros((len(here), LAYOUT.hand_joints, _BANDS + 1))
+        for below, line in enumerate(_LINES):
+            band[:, : len(line), below] = blocks[here[0] : here[-1] + 1, line[0] : line[-1] + 1]
+        # A frame is in its own second difference and, except the last two, in those of the next
+        # two.
+        later, latest = ((here < frames - lag)[:, None] for lag in (1, 2))
+        ties = (1.0 + 4.0 * later + latest, -2.0 * later - 2.0 * latest, 1.0 * latest)
+        for lag in range(3):
+            band[:, :, lag * LAYOUT.hand_joints] += ties[lag] * stiffness
+        return band.reshape(-1, _BANDS + 1)
+
+    step = solve_in_windows(columns, -gradient.ravel(), _BANDS, _WINDOW * LAYOUT.hand_joints)
     return step.reshape(frames, LAYOUT.hand_joints)

@@ -13,7 +13,7 @@ from pianomime.music import Score
 from pianomime.plan import Planner
 from pianomime.players.performance import Performance
 from pianomime.players.rollout import rollout
-from pianomime.progress import Progress, no_progress
+from pianomime.progress import Progress, no_progress, telling
 from pianomime.track import Controller, Tracker
 from pianomime.world import World
 from pianomime.world.layout import LAYOUT
@@ -51,7 +51,8 @@ class Player(ABC):
 
         Args:
             score: what to play; all of it is played (see `pianomime.excerpt`).
-            progress: called with the phases "planning" and "playing".
+            progress: called with the phase "planning", then with those that the planner and the
+                tracker tell (see `pianomime.progress.tell`), and with "playing".
 
         Returns:
             What happened. Its `plan_seconds` is the time that `start` took; a player that plans
@@ -62,7 +63,8 @@ class Player(ABC):
         """
         progress("planning", 0, 0)
         began = time.perf_counter()
-        controller = self.start(score)
+        with telling(progress):
+            controller = self.start(score)
         planned = time.perf_counter()
 
         frames = score.frames()

@@ -21,15 +21,19 @@ from pianomime.plan.joint_path import (
     resting_height,
     smooth_path,
 )
+from pianomime.progress import Steps
 from pianomime.validation import finite
 from pianomime.world import World
 from pianomime.world.hand import Hand
-from pianomime.world.layout import LAYOUT, POINT_COUNT
+from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
 
 _LIFT_DAMPING = 0.01
 """[m/rad] Damping of the lift: joints that raise a fingertip by less hardly move."""
+
+_WINDOW = 1000
+"""Frames whose torques are in memory for every finger."""
 
 # Errors of the path at which their cost is 1 [m].
 _WRIST_TOLERANCE = 0.05  # along the keyboard; the others do not count
@@ -99,17 +103,24 @@ class DynamicController:
         self._tips = []
         self._feedforward = np.empty((len(plan), LAYOUT.ctrl_size))
         self._press = []
+        # Beside the path: its points, the torques of the motion and those of the presses.
+        steps = Steps("controls", len(SIDES) * (config.path.iterations + 3) * len(plan))
         for index, hand in enumerate(self._hands):
             pressing = plan.finger_key[:, index] >= 0
             targets, weights = self._targets(plan.fingertips[:, index], plan.finger_key[:, index])
             clearance = np.full(pressing.shape, np.nan)
             start = np.zeros(LAYOUT.hand_joints)
-            path = smooth_path(hand, start, targets, weights, clearance, config.path)
+            path = smooth_path(hand, start, targets, weights, clearance, config.path, steps.advance)
             self._paths.append(path)
-            self._tips.append(np.array([hand.points(pose)[1:] for pose in path]))
+            tips = np.empty((len(path), FINGER_COUNT, 3))
+            for frame, pose in enumerate(path):
+                tips[frame] = hand.points(pose)[1:]
+            self._tips.append(tips)
+            steps.advance(len(plan))
             torque = motion_torque(hand, path)
-            press = config.force * press_torque(hand, path[1:], pressing)
-            self._press.append(to_actuators(hand, press) / hand.gain)
+            steps.advance(len(plan))
+            self._press.append(_Press(hand, config.force, path[1:], pressing))
+            steps.advance(len(plan))
             middle = (path[1:] + path[:-1]) / 2
             ctrl = middle @ hand.to_ctrl.T + to_actuators(hand, torque) / hand.gain
             self._feedforward[:, hand.actuators] = ctrl
@@ -164,7 +175,7 @@ class DynamicController:
             limit = self.config.tip_error
             move[LAYOUT.slide] += _shared(np.clip(error[keys >= 0, 1], -limit, limit))
             move += self._lift(jacobian[lift, 2])
-            press = self._press[index][frame][~lift].sum(axis=0)
+            press = self._press[index].of(frame, ~lift)
             ctrl[hand.actuators] += hand.to_ctrl @ move + press
         return ctrl, points
 
@@ -198,6 +209,41 @@ class DynamicController:
         targets[:, 1:, 2][pressing] = KEY_REST[finger_key[pressing]] - self.config.depth
         weights[:, 1:][pressing] = 1 / _PRESS_TOLERANCE
         return targets, weights
+
+
+class _Press:
+    """What one hand adds to its controls to press, for the fingers that press alone.
+
+    Few do in any frame: zeros for the others would take five times the memory.
+
+    Args:
+        hand: whose fingers press.
+        force: with which they press [N].
+        path: (T, 27) joint positions [rad, m].
+        pressing: (T, 5) whether each finger presses.
+    """
+
+    def __init__(
+        self,
+        hand: Hand,
+        force: float,
+        path: NDArray[np.float64],
+        pressing: NDArray[np.bool_],
+    ) -> None:
+        self._pressing = pressing
+        self._first = np.append(0, np.cumsum(pressing.sum(axis=1)))
+        self._rows = np.empty((self._first[-1], LAYOUT.hand_actuators))
+        for begin in range(0, len(path), _WINDOW):
+            here = slice(begin, min(begin + _WINDOW, len(path)))
+            press = force * press_torque(hand, path[here], pressing[here])
+            rows = (to_actuators(hand, press) / hand.gain)[pressing[here]]
+            self._rows[self._first[here.start] : self._first[here.stop]] = rows
+
+    def of(self, frame: int, fingers: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """(23,) Sum over those of some fingers (5,) that press in a frame [rad, m]."""
+        rows = self._rows[self._first[frame] : self._first[frame + 1]]
+        chosen: NDArray[np.float64] = rows[fingers[self._pressing[frame]]].sum(axis=0)
+        return chosen
 
 
 def _shared(error: NDArray[np.float64]) -> float:
