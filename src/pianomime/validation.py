@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import typing
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from pianomime.errors import InputError
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+
+_MOST_LAYERS, _WIDEST = 8, 8192
+"""Of a network: what a damaged file asks for must not fill the memory."""
 
 
 def within(name: str, value: float, least: float, most: float = math.inf) -> None:
@@ -36,6 +41,40 @@ def above_zero(name: str, value: float) -> None:
         raise InputError(f"{name.replace('_', '-')} must be a number, not {value!r}")
     if not 0 < value < math.inf:
         raise InputError(f"{name.replace('_', '-')} must be more than 0, not {value:g}")
+
+
+def widths(name: str, layers: Sequence[int]) -> None:
+    """Refuse widths of layers that no network here could have.
+
+    Raises:
+        InputError: there are too many, or one is out of range; the message names it as the command
+            line does.
+    """
+    within(f"number of {name}", len(layers), 0, _MOST_LAYERS)
+    for width in layers:
+        within(name, width, 1, _WIDEST)
+
+
+def whole_numbers(config: DataclassInstance, group: str = "") -> None:
+    """Refuse a config with another value, such as 1.5, where a whole number is due.
+
+    Args:
+        config: whose fields of the types `int` and `tuple[int, ...]` are looked at.
+        group: of settings that it is on the command line, such as "trainer".
+
+    Raises:
+        InputError: there is one; the message names the first as the command line does.
+    """
+    for name, hint in _hints(type(config)).items():
+        value = getattr(config, name)
+        if hint is int:
+            value = (value,)
+        elif hint != tuple[int, ...]:
+            continue
+        for each in value:
+            if not isinstance(each, int) or isinstance(each, bool):
+                option = ".".join(part for part in (group, name.replace("_", "-")) if part)
+                raise InputError(f"{option} must be a whole number, not {each!r}")
 
 
 def finite(config: DataclassInstance) -> None:
@@ -66,3 +105,8 @@ def one_of(name: str, value: str, choices: Sequence[str]) -> None:
         raise InputError(
             f"{name.replace('_', '-')} must be one of {', '.join(choices)}, not {value!r}"
         )
+
+
+@cache
+def _hints(kind: type[DataclassInstance]) -> dict[str, Any]:
+    return typing.get_type_hints(kind)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import BLACK, FRAME_SECONDS, KEYS
 from pianomime.plan.fingertip_plan import RIGHT
 from pianomime.plan.reach import EASE, stretch
-from pianomime.validation import above_zero, finite, within
+from pianomime.validation import above_zero, finite, whole_numbers, within
 from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.parameters import key_centres
 
@@ -60,6 +60,7 @@ class FingeringConfig:
     """Least distance from the left to the right middle finger along the keyboard [m]."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         finite(self)
         within("beam", self.beam, 1)
         for name in ("travel_speed", "hop_speed"):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import BLACK, FRAME_SECONDS
 from pianomime.plan.band_solve import solve_in_windows
 from pianomime.progress import ignore
-from pianomime.validation import above_zero
+from pianomime.validation import above_zero, whole_numbers
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import key_centres, key_half_sizes
@@ -88,6 +88,7 @@ class PathConfig:
     """Number of Gauss-Newton steps."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         for name, value in vars(self).items():
             above_zero(name, value)
 

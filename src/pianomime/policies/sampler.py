@@ -15,7 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.validation import within
+from pianomime.validation import whole_numbers, within
 
 Denoise = Callable[[NDArray[np.float32], NDArray[np.int64]], NDArray[np.float32]]
 """The network: from noisy chunks (B, T, D) and diffusion steps (B,) to predictions (B, T, D)."""
@@ -31,6 +31,7 @@ class Sampler:
     """Noise added on the way: 0 is DDIM; 1 with all steps is DDPM, as in the paper."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         within("steps", self.steps, 1)
         within("eta", self.eta, 0, 1)
 

@@ -17,7 +17,7 @@ from pianomime.errors import InputError
 from pianomime.plan import FingertipPlan
 from pianomime.track.controller import Controller
 from pianomime.track.tracker import Tracker
-from pianomime.validation import finite
+from pianomime.validation import finite, whole_numbers
 from pianomime.world import World, WorldBatch
 from pianomime.world.hand import by_actuator
 from pianomime.world.layout import LAYOUT
@@ -54,6 +54,7 @@ class PredictiveSamplingConfig:
     """Seed of the variations."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         finite(self)
         for name in ("variations", "rounds", "commit", "ahead", "knots"):
             if getattr(self, name) < 1:

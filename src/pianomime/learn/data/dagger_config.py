@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from pianomime.validation import within
+from pianomime.validation import whole_numbers, within
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class DaggerConfig:
     """Seed of the noise and of the policies' sampling."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         within("noise", self.noise, 0, 1)
         within("noise_correlation", self.noise_correlation, 0, 0.99)
         for name in ("max_demonstrations", "seed"):

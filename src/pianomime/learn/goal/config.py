@@ -6,7 +6,10 @@ from dataclasses import dataclass, field
 
 from pianomime.keyboard import KEYS
 from pianomime.learn.runs.trainer_config import TrainerConfig
-from pianomime.validation import within
+from pianomime.validation import whole_numbers, within
+
+RESULT = "goal.safetensors"
+"""The file that a finished training leaves in its folder."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class GoalConfig:
     )
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         within("queries", self.queries, 1)
         within("octaves", self.octaves, 0, 12)
         within("transpose", self.transpose, 0, KEYS - 1)

@@ -95,6 +95,7 @@ def read_goals(folders: Sequence[Path], validation_share: float, progress: Progr
     found: dict[str, Goals] = {}
     skipped = 0
     paths = find_songs(folders)
+    progress("reading", 0, len(paths))
     for done, path in enumerate(paths, 1):
         try:
             with warnings.catch_warnings():

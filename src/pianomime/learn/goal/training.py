@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from pianomime.errors import InputError
 from pianomime.learn.goal.autoencoder import GoalAutoencoder, GoalEncoder
-from pianomime.learn.goal.config import GoalConfig
+from pianomime.learn.goal.config import RESULT, GoalConfig
 from pianomime.learn.goal.goals import Goals, GoalSampler, GoalSplit, read_goals
 from pianomime.learn.goal.picture import draw_codes
 from pianomime.learn.goal.sdf import KEYBOARD_LENGTH, QUERY_HIGH, QUERY_LOW, chamfer, distance
@@ -22,7 +22,6 @@ from pianomime.learn.runs.safetensors_file import read_tensors, write_tensors
 from pianomime.learn.runs.trainer import Batch, load_arrays, train_network
 from pianomime.progress import Progress, no_progress
 
-_RESULT = "goal.safetensors"
 _VERSION = 1
 _STANDARDIZED = 20_000
 """Training goals from which mean and standard deviation of the codes are computed."""
@@ -89,10 +88,11 @@ def train_goal(
             "validation_goals": goals.validation.digest,
         },
     )
+    progress("evaluating", 0, 0)
     with torch.no_grad():
         module.encoder.standardize(_subset(goals.train, _STANDARDIZED))
     weights = {name: tensor.numpy() for name, tensor in module.state_dict().items()}
-    write_tensors(out / _RESULT, weights, {"version": _VERSION, "octaves": config.octaves})
+    write_tensors(out / RESULT, weights, {"version": _VERSION, "octaves": config.octaves})
     draw_codes(module.encoder, validation, out / "codes.png")
     return evaluate_autoencoder(module, validation), goals
 
@@ -112,7 +112,7 @@ def load_autoencoder(folder: Path) -> GoalAutoencoder:
     Raises:
         InputError: there is none, or it is damaged or of another version.
     """
-    path = folder / _RESULT
+    path = folder / RESULT
     arrays, metadata = read_tensors(path)
     if metadata.get("version") != _VERSION or "octaves" not in metadata:
         raise InputError(f"{path}: not a goal autoencoder, or one of another version")

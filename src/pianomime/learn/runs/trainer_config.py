@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pianomime.validation import above_zero, within
+from pianomime.validation import above_zero, whole_numbers, within
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,8 @@ class TrainerConfig:
     weight_decay: float = 1e-6
     """Weight decay of AdamW."""
     warmup: int = 500
-    """Number of updates in which the learning rate rises linearly from 0."""
+    """Number of updates in which the learning rate rises linearly from 0; where it is not less than
+    that of all updates, a tenth of these."""
     ema_power: float = 0.75
     """Power of the decay 1 - (1 + step)^-power of the weights' exponential moving average."""
     seed: int = 0
@@ -33,13 +34,17 @@ class TrainerConfig:
     """Number of updates between evaluations; 0 for only one, at the end."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self, "trainer")
         for name in ("steps", "batch"):
             within(f"trainer.{name}", getattr(self, name), 1)
         for name in ("learning_rate", "ema_power"):
             above_zero(f"trainer.{name}", getattr(self, name))
         for name in ("weight_decay", "seed", "checkpoint_seconds", "evaluate_every"):
             within(f"trainer.{name}", getattr(self, name), 0)
-        within("trainer.warmup", self.warmup, 0, self.steps - 1)
+        within("trainer.warmup", self.warmup, 0)
+        if self.warmup >= self.steps:
+            # Whoever asks for a few updates to try it out does not think of this setting.
+            object.__setattr__(self, "warmup", self.steps // 10)
 
 
 MAY_DIFFER = ("checkpoint_seconds", "evaluate_every")
