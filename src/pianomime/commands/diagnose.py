@@ -50,6 +50,7 @@ class Diagnose:
         from pianomime.files import staged
         from pianomime.players.performance import Performance
         from pianomime.report import DIAGNOSIS_FILES, write_diagnosis
+        from pianomime.shown import shown
 
         if not self.performances:
             raise InputError("no performance to diagnose")
@@ -64,17 +65,19 @@ class Diagnose:
         console.print(_causes(diagnoses))
         if any(diagnosis.faults for diagnosis in diagnoses):
             console.print(_longest(diagnoses))
-        print(f"picture: {out / 'diagnosis.png'}")
+        print(f"picture: {shown(out / 'diagnosis.png')}")
 
 
 def _causes(diagnoses: Sequence[Diagnosis]) -> Table:
     from rich.table import Table
+    from rich.text import Text
 
     from pianomime.evaluation.diagnose import totals
 
+    # A Text, not a str, in which rich would look for markup.
     songs = diagnoses[0].song if len(diagnoses) == 1 else f"{len(diagnoses)} songs"
     table = Table(
-        title=songs,
+        title=Text(songs),
         title_style="bold",
         caption="frames: one key for 0.05 s; share: of all frames in which keys should be down",
     )
@@ -97,6 +100,7 @@ def _causes(diagnoses: Sequence[Diagnosis]) -> Table:
 
 def _longest(diagnoses: Sequence[Diagnosis]) -> Table:
     from rich.table import Table
+    from rich.text import Text
 
     from pianomime.keyboard import FRAME_RATE, key_name
 
@@ -111,7 +115,7 @@ def _longest(diagnoses: Sequence[Diagnosis]) -> Table:
     faults = [(made.song, fault) for made in diagnoses for fault in made.faults]
     for song, fault in sorted(faults, key=lambda item: -item[1].frames)[:_LONGEST]:
         table.add_row(
-            *([song] if several else []),
+            *([Text(song)] if several else []),
             f"{fault.first / FRAME_RATE:.2f}",
             f"{fault.frames / FRAME_RATE:.2f}",
             key_name(fault.key),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -59,11 +58,12 @@ class Evaluate:
         """
         from pianomime.commands.progress import bars
         from pianomime.evaluation.evaluation import evaluate, markdown
+        from pianomime.file_names import file_name
+        from pianomime.shown import shown
 
         seeded = f"-seed{self.seed}" if self.seed else ""
         # A player may be called by a path or a module.
-        name = re.sub(r"[^\w.-]+", "-", self.player).strip("-.")
-        out = self.out or Path("out", f"evaluate-{name}-{self.effort}{seeded}")
+        out = self.out or Path("out", f"evaluate-{file_name(self.player)}-{self.effort}{seeded}")
         with bars() as progress:
             results = evaluate(
                 self.paths,
@@ -77,4 +77,4 @@ class Evaluate:
                 progress=progress,
             )
         print(markdown(results))
-        print(f"saved: {out / 'results.json'}")
+        print(f"saved: {shown(out / 'results.json')}")

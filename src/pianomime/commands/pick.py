@@ -40,10 +40,12 @@ class Pick:
         import webbrowser
 
         from pianomime.errors import InputError
+        from pianomime.file_names import file_name
+        from pianomime.shown import command_word, shown
         from pianomime.video.film.film import Film
         from pianomime.video.keyboard.pick_page import PickPage
 
-        out = self.out or Path("out", self.video.stem + "-points.json")
+        out = self.out or Path("out", file_name(self.video.stem) + "-points.json")
         if out.suffix != ".json":
             raise InputError(f"{out}: the name of a file of points must end in .json")
         with PickPage(Film(self.video), out, self.port) as page:
@@ -52,5 +54,7 @@ class Pick:
             if self.browser:
                 webbrowser.open(page.url)
             saved = page.wait()
-        print(f"saved {out}: {saved}")
-        print(f"next: pianomime retarget {self.video} --points {out}")
+        print(f"saved {shown(out)}: {shown(saved)}")
+        print(
+            f"next: pianomime retarget {command_word(self.video)} --points {command_word(out)}"
+        )

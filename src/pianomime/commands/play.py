@@ -73,11 +73,13 @@ class Play:
         from rich.console import Console
 
         from pianomime.commands.progress import bars
+        from pianomime.file_names import file_name
         from pianomime.files import staged
         from pianomime.report import FILES, write_report
+        from pianomime.shown import shown
 
         player, score, name = self._load()
-        out = self.out or Path("out", name)
+        out = self.out or Path("out", file_name(name))
         notes: list[str] = []
         with staged(out, FILES) as folder, bars() as progress:
             row = write_report(
@@ -89,8 +91,8 @@ class Play:
             )
         Console().print(_table(row))
         for note in notes:
-            print(note)
-        print(f"look and listen: {out / 'report.html'}")
+            print(shown(note))
+        print(f"look and listen: {shown(out / 'report.html')}")
 
     def _load(self) -> tuple[Player, Score, str]:
         """Who plays what, and the name of its file."""
@@ -123,8 +125,10 @@ class Play:
 
 def _table(row: Row) -> Table:
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table(title=str(row["song"]), title_style="bold", show_header=False)
+    # A Text, not a str, in which rich would look for markup.
+    table = Table(title=Text(str(row["song"])), title_style="bold", show_header=False)
     for label, text in (
         ("F1", f"{row['f1']:.3f}"),
         ("precision, recall", f"{row['precision']:.3f}, {row['recall']:.3f}"),

@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pianomime.progress import Progress
+from pianomime.shown import shown
 
 _LINE_SECONDS = 30.0
 """[s] between lines, where there is no terminal to draw a bar on."""
@@ -94,6 +95,7 @@ class _Shown:
 
     def report(self, phase: str, done: int, total: int, remark: str = "") -> None:
         """As `Progress`."""
+        phase, remark = shown(phase), shown(remark)
         now = self.phase
         if now is None or now.name != phase or done < now.done:
             self.phase = _Phase(phase, done, total, remark)

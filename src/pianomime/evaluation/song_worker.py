@@ -12,6 +12,7 @@ from pianomime.music import Score
 from pianomime.music.excerpt import excerpt
 from pianomime.players.player import Player
 from pianomime.players.registry import load_player
+from pianomime.shown import title_of
 
 SONG_WORKER = "pianomime.evaluation.song_worker:load_song_worker"
 """`load_song_worker`, for `pianomime.workers`."""
@@ -49,7 +50,7 @@ def play_song(player: Player, song: Path, seconds: float) -> dict[str, Any]:
     start, length = player.excerpt or (0.0, seconds)
     performance = player.play(excerpt(Score.from_midi(song), start, length))
     # Two files can bear one title, but not one name in a folder.
-    row: dict[str, Any] = {**summarize(performance), "song": song.stem}
+    row: dict[str, Any] = {**summarize(performance), "song": title_of(song)}
     if performance.plan is not None:
         row["causes"] = frames_by_cause(diagnose(performance))
     return row

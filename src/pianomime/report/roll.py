@@ -190,6 +190,8 @@ def sheet(height: float, title: str, remark: str, theme: Theme) -> Figure:
     figure.text(
         LEFT_EDGE, 1 - 0.34 / height, title if len(title) <= 48 else f"{title[:47]}…",
         color=theme.text, fontsize=15, fontweight="bold", va="center",
+        # A dollar sign in a title begins no formula.
+        parse_math=False, usetex=False,
     )  # fmt: skip
     figure.text(
         RIGHT_EDGE, 1 - 0.34 / height, remark,

@@ -17,6 +17,7 @@ from pianomime.errors import InputError
 from pianomime.learn.data.published import read_published
 from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.plan.demonstration import TRAIN, Demonstration
+from pianomime.shown import shown
 
 DEMONSTRATION_COLUMNS = ("goal", "fingertips")
 """Columns of data sets made of demonstrations."""
@@ -125,7 +126,7 @@ def _is_validation(song: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 def _song_number(number: int, title: str) -> int:
     """The number of a song; where it is unknown, clips of one title count as one song."""
-    return number if number >= 0 else zlib.crc32(title.encode())
+    return number if number >= 0 else zlib.crc32(shown(title).encode())
 
 
 def demonstration_dataset(source: Path) -> Dataset:
