@@ -31,7 +31,7 @@ def write(path: Path, performance: Performance, light_up: bool) -> None:
         performance.qpos,
         performance.pressed,
         None,
-        colours=key_colours(lit),
+        colours=lambda frame: key_colours(lit[frame]),
         view=View(camera="top"),
     )
 

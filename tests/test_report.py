@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import json
 import os
 from html.parser import HTMLParser
@@ -19,7 +18,7 @@ from pianomime.evaluation.summary import summarize
 from pianomime.files import staged
 from pianomime.music import Score
 from pianomime.report import DARK, FILES, draw, write_report
-from pianomime.report.mp3 import mp3
+from pianomime.report.mp3 import write_mp3
 from pianomime.world.render import RenderUnavailable
 
 PROTOCOL = (
@@ -55,7 +54,11 @@ def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) ->
     performance = made_up.performance(made_up.score(title="<b>Bach & Söhne</b>"))
     row = write_report(performance, tmp_path, False, lambda *_: None, pytest.fail)
 
-    assert {file.name for file in tmp_path.iterdir()} == set(FILES) - {"performance.mp4"}
+    assert {file.name for file in tmp_path.iterdir()} == set(FILES) - {
+        "performance.mp4",
+        "performance.mp3",
+        "score.mp3",
+    }
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == row
     np.testing.assert_array_equal(
         Performance.load(tmp_path / "performance.npz").pressed, performance.pressed
@@ -109,10 +112,12 @@ def test_an_hour_is_drawn_too(tmp_path: Path) -> None:
     assert imread(tmp_path / "roll.png").shape[0] < 12_000
 
 
-def test_mp3_has_the_length_of_the_sound() -> None:
+def test_mp3_has_the_length_of_the_sound(tmp_path: Path) -> None:
     seconds = 2.0
     sound = np.sin(np.arange(int(44100 * seconds))[:, None] * 0.06 * np.ones(2)).astype(np.float32)
-    with av.open(io.BytesIO(mp3(sound, 44100))) as file:
+    blocks = (sound[first : first + 30_000] for first in range(0, len(sound), 30_000))
+    write_mp3(tmp_path / "sound.mp3", blocks, 44100)
+    with av.open(str(tmp_path / "sound.mp3")) as file:
         decoded = sum(frame.samples for frame in file.decode(audio=0))
     assert decoded / 44100 == pytest.approx(seconds, abs=0.1)
 
@@ -162,7 +167,7 @@ def test_a_folder_that_cannot_be_written_is_named(
     def refuse(*_: object, **__: object) -> None:
         raise PermissionError(errno.EACCES, "Permission denied", str(tmp_path / "temporary"))
 
-    for module, function in (("tempfile", "mkdtemp"), ("os", "replace")):
+    for module, function in (("pathlib.Path", "mkdir"), ("os", "replace")):
         out.mkdir(exist_ok=True)
         with monkeypatch.context() as patch:
             patch.setattr(f"{module}.{function}", refuse)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pianomime.music import Score, render_audio, write_wav
-from pianomime.music.sound import MAX_SECONDS, SAMPLE_RATE, TAIL
+from pianomime.music.sound import MAX_SECONDS, SAMPLE_RATE, TAIL, Sound
+from pianomime.music.wav import WavFile, write_wav_blocks
 
 RATE = 8000
 
@@ -140,6 +141,31 @@ def test_a_multitude_of_notes(length: float) -> None:
     assert np.abs(render_audio(score, RATE)).max() == pytest.approx(0.9, abs=1e-5)
 
 
+@pytest.mark.parametrize("rate", [RATE, SAMPLE_RATE])
+def test_blocks_join_without_a_seam(kind: str, rate: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    generator = np.random.default_rng(1)
+    onset = generator.uniform(0, 25, 60)
+    # The first bass note is held over all blocks but the last.
+    onset[0] = 0.5
+    offset = onset + generator.uniform(0.1, 4, 60)
+    offset[0] = 24.0
+    key = generator.integers(10, 88, 60)
+    score = Score(key, onset, offset, generator.integers(30, 127, 60), [[3.0, 9.5], [17.0, 21.0]])
+    whole = render_audio(score, rate)
+    monkeypatch.setattr("pianomime.music.sound.BLOCK_SECONDS", 4)
+    sound, told = Sound(score, rate), []
+    blocks = list(sound.blocks(told.append))
+    assert len(blocks) == sound.block_count > 5
+    assert max(len(block) for block in blocks) == 4 * rate
+    assert sum(told) == 2 * sound.block_count
+    if kind == "plain":
+        np.testing.assert_array_equal(np.concatenate(blocks), whole)
+    else:
+        # The synthesizer rounds to 16 bits, here of a sound whose loudest sample is not full scale;
+        # before every block, it knows of ten seconds.
+        np.testing.assert_allclose(np.concatenate(blocks), whole, atol=3e-3)
+
+
 def test_a_very_long_song_is_cut_with_a_warning() -> None:
     # Hours of silence would take the memory all the same.
     with pytest.warns(UserWarning, match="first 10 of 180 minutes"):
@@ -157,3 +183,19 @@ def test_wav_file(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["song.wav"]
     with pytest.raises(ValueError, match=r"\(S, C\)"):
         write_wav(tmp_path / "song.wav", audio[:, 0])
+
+
+def test_wav_files_are_written_and_read_in_blocks(tmp_path: Path) -> None:
+    audio = np.linspace(-1, 1, 2 * 2500, dtype=np.float32).reshape(-1, 2)
+    write_wav_blocks(
+        tmp_path / "song.wav", (audio[at : at + 700] for at in range(0, 2500, 700)), 2, 500
+    )
+    with WavFile(tmp_path / "song.wav") as file:
+        assert file.shape == (2500, 2)
+        assert file.sample_rate == 500
+        np.testing.assert_allclose(file[100:220], audio[100:220], atol=2e-5)
+        np.testing.assert_allclose(file[2490:9999], audio[2490:], atol=2e-5)
+        assert file[9999:99999].shape == (0, 2)
+        blocks = list(file.blocks(2.0))
+        assert [len(block) for block in blocks] == [1000, 1000, 500]
+        np.testing.assert_allclose(np.concatenate(blocks), audio, atol=2e-5)

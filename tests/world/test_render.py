@@ -139,9 +139,9 @@ def test_a_film_has_every_frame_and_its_sound(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("opengl")
 def test_a_film_may_be_silent_and_have_its_own_colours(tmp_path: Path) -> None:
     qpos, pressed = performance(4)
-    colours = np.full((4, KEYS, 3), (1.0, 0.0, 0.0), np.float32)
+    red = np.full((KEYS, 3), (1.0, 0.0, 0.0), np.float32)
     path = tmp_path / "film.mp4"
-    write_video(path, qpos, pressed, None, colours=colours, view=View(size=SMALL))
+    write_video(path, qpos, pressed, None, colours=lambda _: red, view=View(size=SMALL))
     with av.open(str(path)) as film:
         assert not film.streams.audio
         picture = next(film.decode(video=0)).to_ndarray(format="rgb24").astype(int)

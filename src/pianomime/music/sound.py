@@ -1,4 +1,4 @@
-"""Sound of a score, by a sampled piano if there is one, else by additive synthesis; WAV files.
+"""Sound of a score, a minute at a time: a sampled piano if there is one, else additive synthesis.
 
 The samples are those of the soundfont in pretty_midi's wheel, the synthesizer is midirenderer's:
 both come with `pip install`, without a system library. (symusic, which reads the MIDI files, has a
@@ -9,9 +9,9 @@ velocity.)
 from __future__ import annotations
 
 import io
-import os
 import warnings
 import wave
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib.util import find_spec
 from math import gcd
@@ -21,29 +21,128 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.files import atomic
 from pianomime.music.midi import midi_bytes
 from pianomime.music.score import Score
+from pianomime.progress import ignore
 
 SAMPLE_RATE = 48_000
 """[Hz] Sample rate of the synthesizer; any other takes a conversion."""
 
 MAX_SECONDS = 600.0
-"""[s] Longest sound; that of a song of three hours would take 4 GB."""
+"""[s] Longest sound in one array: an hour would take 1.4 GB. `Sound` has no such limit."""
+
+BLOCK_SECONDS = 60
+"""[s] Sound that is made at a time."""
 
 PEAK = 0.9
 """Amplitude of the loudest sample."""
 TAIL = 1.5
 """[s] Time for the last note to fade."""
 
-RING = 10.0
-"""[s] Time after which every string has faded, so that the pedal makes no difference."""
+RING = 10
+"""[s] Time after which every string has faded, so that neither key nor pedal makes a difference."""
+
+
+class Sound:
+    """The sound of a score of any length as a grand piano plays it, made a minute at a time.
+
+    Notes sound as long as their key or the sustain pedal is down.
+
+    Attributes:
+        sample_rate: samples per second [Hz].
+        samples: number of samples S; it ends 1.5 s after the last note has been damped.
+        block_count: number of blocks.
+
+    Args:
+        score: the music.
+        sample_rate: samples per second [Hz].
+    """
+
+    def __init__(self, score: Score, sample_rate: int = SAMPLE_RATE) -> None:
+        # Pedal that holds only silence makes no sound.
+        end = score.offset.max(initial=0.0) + RING
+        self._score = replace(score, pedal=np.minimum(score.pedal, end))
+        self._end = _damped(self._score)
+        self.sample_rate = sample_rate
+        self.samples = round((self._end.max(initial=0.0) + TAIL) * sample_rate)
+        self._block = BLOCK_SECONDS * sample_rate
+        self.block_count = -(-self.samples // self._block)
+
+    def blocks(self, advance: Callable[[int], None] = ignore) -> Iterator[NDArray[np.float32]]:
+        """Make the sound twice: to find the loudest sample, and once more to scale it.
+
+        Args:
+            advance: called with 1 after each block, both times.
+
+        Yields:
+            (s, 2) left and right, one block after the other; the loudest sample of all is at 0.9.
+        """
+        play, loudest, only = self._loudest(advance)
+        for index in range(self.block_count):
+            audio = play(index) if only is None else only
+            if loudest > 0:
+                audio *= PEAK / loudest
+            yield audio
+            advance(1)
+
+    def _loudest(
+        self, advance: Callable[[int], None]
+    ) -> tuple[Callable[[int], NDArray[np.float32]], float, NDArray[np.float32] | None]:
+        """What plays a block, the greatest amplitude, and the sound if it is one block alone."""
+        for play in (self._samples, self._partials):
+            loudest, audio = 0.0, None
+            try:
+                for index in range(self.block_count):
+                    audio = play(index)
+                    loudest = max(loudest, audio.max(), -audio.min())
+                    advance(1)
+            except _NoSamplesError:
+                continue
+            return play, loudest, audio if self.block_count == 1 else None
+        raise AssertionError("additive synthesis needs nothing")
+
+    def _samples(self, index: int) -> NDArray[np.float32]:
+        """(s, 2) A block of the sound of a sampled piano.
+
+        Raises:
+            _NoSamplesError: there is no such piano.
+        """
+        begin = index * BLOCK_SECONDS
+        count = min(self._block, self.samples - index * self._block)
+        audio = np.zeros((count, 2), np.float32)
+        if not len(self._score):
+            return audio
+        # What was struck before still sounds; all voices begin where they would in the whole.
+        origin = begin - min(begin, RING)
+        stop = begin + count / self.sample_rate
+        if index + 1 < self.block_count:
+            stop += TAIL  # a conversion looks ahead
+        heard = (self._score.onset >= origin) & (self._score.onset < stop)
+        # The synthesizer stops at the last event, so a pedal move is added at the end.
+        end = stop - origin
+        pedal = np.clip(self._score.pedal - origin, 0.0, end)
+        part = replace(
+            self._score,
+            key=self._score.key[heard],
+            onset=self._score.onset[heard] - origin,
+            offset=np.minimum(self._score.offset[heard] - origin, end),
+            velocity=self._score.velocity[heard],
+            pedal=np.append(pedal, [[end - 0.01, end]], axis=0),
+        )
+        made = _synthesized(part, self.sample_rate)[(begin - origin) * self.sample_rate :][:count]
+        audio[: len(made)] = made
+        return audio
+
+    def _partials(self, index: int) -> NDArray[np.float32]:
+        """(s, 2) A block of the sound of decaying partials, with the bass to the left."""
+        first = index * self._block
+        audio = np.zeros((min(self._block, self.samples - first), 2), np.float32)
+        _play_partials(self._score, self._end, self.sample_rate, first, audio)
+        return audio
 
 
 def render_audio(score: Score, sample_rate: int = SAMPLE_RATE) -> NDArray[np.float32]:
-    """Synthesize a score as a grand piano plays it.
-
-    Notes sound as long as their key or the sustain pedal is down.
+    """Synthesize a score as `Sound` does, into one array.
 
     Args:
         score: the music; what begins after 10 minutes is left out, with a warning.
@@ -53,59 +152,31 @@ def render_audio(score: Score, sample_rate: int = SAMPLE_RATE) -> NDArray[np.flo
         (S, 2) float32, left and right, with the loudest sample at 0.9; silence for an empty
         score. It ends 1.5 s after the last note has been damped.
     """
-    score = _audible(score)
-    end = _damped(score)
-    audio = np.zeros((round((end.max(initial=0.0) + TAIL) * sample_rate), 2), np.float32)
-    if len(score) and not _play_samples(score, sample_rate, audio):
-        _play_partials(score, end, sample_rate, audio)
-    loudest = max(audio.max(), -audio.min())
-    if loudest > 0:
-        audio *= PEAK / loudest
+    sound = Sound(_beginning(score), sample_rate)
+    audio = np.empty((sound.samples, 2), np.float32)
+    first = 0
+    for block in sound.blocks():
+        audio[first : first + len(block)] = block
+        first += len(block)
     return audio
 
 
-def write_wav(
-    path: str | os.PathLike[str], audio: NDArray[np.floating], sample_rate: int = SAMPLE_RATE
-) -> None:
-    """Write a 16-bit WAV file.
-
-    Args:
-        path: the file; it is written in one step.
-        audio: (S, C) samples of C channels; those beyond -1..1 are clipped.
-        sample_rate: samples per second [Hz].
-
-    Raises:
-        ValueError: the audio has another shape.
-    """
-    if audio.ndim != 2:
-        raise ValueError(f"audio must be (S, C), not {audio.shape}")
-    with atomic(path) as temporary, wave.open(str(temporary), "wb") as file:
-        file.setnchannels(audio.shape[1])
-        file.setsampwidth(2)
-        file.setframerate(sample_rate)
-        # Second by second, to keep copies of long sounds out of memory.
-        for first in range(0, len(audio), sample_rate):
-            samples = np.clip(audio[first : first + sample_rate], -1, 1) * 32767
-            file.writeframes(np.rint(samples).astype("<i2").tobytes())
-
-
-def _audible(score: Score) -> Score:
-    """The score without notes after `MAX_SECONDS`, and without pedal that holds only silence."""
-    if score.duration > MAX_SECONDS:
-        warnings.warn(
-            f"only the first {MAX_SECONDS / 60:.0f} of {score.duration / 60:.0f} minutes "
-            f"are made into sound",
-            stacklevel=2,
-        )
+def _beginning(score: Score) -> Score:
+    """The score without what comes after `MAX_SECONDS`."""
+    if score.duration <= MAX_SECONDS:
+        return score
+    warnings.warn(
+        f"only the first {MAX_SECONDS / 60:.0f} of {score.duration / 60:.0f} minutes "
+        f"are made into sound",
+        stacklevel=3,
+    )
     heard = score.onset < MAX_SECONDS
-    offset = np.minimum(score.offset[heard], MAX_SECONDS)
     return replace(
         score,
         key=score.key[heard],
         onset=score.onset[heard],
-        offset=offset,
+        offset=np.minimum(score.offset[heard], MAX_SECONDS),
         velocity=score.velocity[heard],
-        pedal=np.minimum(score.pedal, offset.max(initial=0.0) + RING),
     )
 
 
@@ -117,32 +188,38 @@ def _damped(score: Score) -> NDArray[np.float64]:
     return damped
 
 
-def _play_samples(score: Score, sample_rate: int, audio: NDArray[np.float32]) -> bool:
-    """Write the sound of a sampled piano into (S, 2); returns False where there is none."""
+class _NoSamplesError(Exception):
+    """There is no synthesizer, or no soundfont."""
+
+
+def _synthesized(score: Score, sample_rate: int) -> NDArray[Any]:
+    """(S, 2) Samples of a sampled piano, up to the last event.
+
+    Raises:
+        _NoSamplesError: there is none.
+    """
     # Only located, because importing pretty_midi takes longer than synthesizing the music.
     library = find_spec("pretty_midi")
     if library is None or library.origin is None:
-        return False
-    # The synthesizer stops at the last event, so a pedal move is added after the sound has faded.
-    end = len(audio) / sample_rate
-    longer = replace(score, pedal=np.append(score.pedal, [[end - 0.01, end]], axis=0))
+        raise _NoSamplesError
     try:
         # There is no wheel of midirenderer for some platforms, and no soundfont in the source
         # distribution of pretty_midi.
         from midirenderer import render_wave_from
 
         soundfont = Path(library.origin).with_name("TimGM6mb.sf2").read_bytes()
-        samples, rate = _read_wav(render_wave_from(soundfont, midi_bytes(longer)))
-    except (ImportError, OSError, RuntimeError):
-        return False
-    if rate != sample_rate:
-        from scipy.signal import resample_poly
+        samples, rate = _read_wav(render_wave_from(soundfont, midi_bytes(score)))
+    except (ImportError, OSError, RuntimeError) as error:
+        raise _NoSamplesError from error
+    if rate == sample_rate:
+        return samples
+    from scipy.signal import resample_poly
 
-        common = gcd(sample_rate, rate)
-        samples = resample_poly(samples.astype(np.float32), sample_rate // common, rate // common)
-    samples = samples[: len(audio)]
-    audio[: len(samples)] = samples
-    return True
+    common = gcd(sample_rate, rate)
+    converted: NDArray[Any] = resample_poly(
+        samples.astype(np.float32), sample_rate // common, rate // common
+    )
+    return converted
 
 
 def _read_wav(content: bytes) -> tuple[NDArray[Any], int]:
@@ -153,7 +230,11 @@ def _read_wav(content: bytes) -> tuple[NDArray[Any], int]:
 
 
 def _play_partials(
-    score: Score, end: NDArray[np.float64], sample_rate: int, audio: NDArray[np.float32]
+    score: Score,
+    end: NDArray[np.float64],
+    sample_rate: int,
+    first: int,
+    audio: NDArray[np.float32],
 ) -> None:
     """Add the sound of six decaying partials per key, with the bass to the left.
 
@@ -161,10 +242,20 @@ def _play_partials(
         score: the music.
         end: (N,) time at which each note is damped [s].
         sample_rate: samples per second [Hz].
+        first: number of the sample at which the array begins.
         audio: (S, 2) the sound is added to this array.
     """
     release = np.exp(-np.arange(sample_rate // 2) / (0.08 * sample_rate)).astype(np.float32)
     for key in np.unique(score.key).tolist():
+        notes = np.flatnonzero(score.key == key)
+        # A key that is struck again stops its previous note.
+        stop = np.minimum(end[notes], np.append(score.onset[notes[1:]], np.inf))
+        begins = np.rint(score.onset[notes] * sample_rate).astype(int) - first
+        held = np.rint((stop - score.onset[notes]) * sample_rate).astype(int)
+        loudness = (score.velocity[notes] / 127) ** 2
+        heard = (begins < len(audio)) & (begins + held + len(release) > 0)
+        if not heard.any():
+            continue
         pitch = 440.0 * 2 ** ((key - 48) / 12)
         ring = 3.0 * 2 ** (-key / 24)
         string = np.zeros(round(7 * ring * sample_rate), np.float32)
@@ -176,14 +267,11 @@ def _play_partials(
                 string[: len(time)] += decay * np.sin(2 * np.pi * partial * pitch * time)
         place = np.pi / 4 + (key - 43.5) / 43.5 * np.pi / 10
         sides = np.array([np.cos(place), np.sin(place)], np.float32)
-        notes = np.flatnonzero(score.key == key)
-        # A key that is struck again stops its previous note.
-        stop = np.minimum(end[notes], np.append(score.onset[notes[1:]], np.inf))
-        first = np.rint(score.onset[notes] * sample_rate).astype(int)
-        held = np.rint((stop - score.onset[notes]) * sample_rate).astype(int)
-        loudness = (score.velocity[notes] / 127) ** 2
-        for begin, length, gain in zip(first.tolist(), held.tolist(), loudness, strict=True):
+        for begin, length, gain in zip(
+            begins[heard].tolist(), held[heard].tolist(), loudness[heard], strict=True
+        ):
             note = np.float32(gain) * string[: length + len(release)]
             note[length:] *= release[: len(note[length:])]
-            part = audio[begin : begin + len(note)]
+            note = note[max(-begin, 0) :]
+            part = audio[max(begin, 0) :][: len(note)]
             part += note[: len(part), None] * sides

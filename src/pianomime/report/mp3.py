@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import io
+import os
+from collections.abc import Iterable
 from fractions import Fraction
 
 import av
@@ -12,26 +13,30 @@ from numpy.typing import NDArray
 _BITS_PER_SECOND = 128_000
 
 
-def mp3(audio: NDArray[np.float32], sample_rate: int) -> bytes:
-    """Encode sound as MP3.
+def write_mp3(
+    path: str | os.PathLike[str], blocks: Iterable[NDArray[np.float32]], sample_rate: int
+) -> None:
+    """Encode sound as MP3, block by block.
 
     Args:
-        audio: (S, 2) samples, -1..1.
+        path: the file.
+        blocks: (s, 2) samples, -1..1, one block after the other.
         sample_rate: samples per second [Hz].
     """
-    buffer = io.BytesIO()
-    with av.open(buffer, "w", format="mp3") as container:
+    with av.open(os.fspath(path), "w", format="mp3") as container:
         # At this rate, the encoder's fast search sounds like its thorough one.
         stream = container.add_stream(
             "libmp3lame", rate=sample_rate, layout="stereo", options={"compression_level": "7"}
         )
         stream.bit_rate = _BITS_PER_SECOND
-        # Second by second, to keep copies of long sounds out of memory.
-        for first in range(0, len(audio), sample_rate):
-            samples = np.ascontiguousarray(audio[first : first + sample_rate].T, np.float32)
-            frame = av.AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
-            frame.sample_rate = sample_rate
-            frame.pts, frame.time_base = first, Fraction(1, sample_rate)
-            container.mux(stream.encode(frame))
+        begin = 0
+        for block in blocks:
+            # Second by second, to keep copies of long blocks out of memory.
+            for first in range(0, len(block), sample_rate):
+                samples = np.ascontiguousarray(block[first : first + sample_rate].T, np.float32)
+                frame = av.AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
+                frame.sample_rate = sample_rate
+                frame.pts, frame.time_base = begin + first, Fraction(1, sample_rate)
+                container.mux(stream.encode(frame))
+            begin += len(block)
         container.mux(stream.encode(None))
-    return buffer.getvalue()

@@ -1,10 +1,15 @@
-"""`report.html`: one self-contained page with sound, pictures and metrics, without the network."""
+"""`report.html`: one page with film, sound, pictures and metrics, without the network.
+
+It holds everything itself, but for the sound and the film of long pieces, which stand beside it.
+"""
 
 from __future__ import annotations
 
 import base64
 from html import escape
+from pathlib import Path
 from string import Template
+from urllib.parse import quote
 
 from pianomime.evaluation.summary import Row
 
@@ -116,26 +121,29 @@ _ROWS = {
     "realtime_factor": ("Seconds of music per second of computing", "{:.1f}"),
 }
 
+MOST_EMBEDDED = 16 << 20
+"""[bytes] Larger files stand beside the page: sound of more than 17 minutes, and long films."""
+
 
 def page(
     summary: Row,
     version: str,
-    played: bytes,
-    wanted: bytes,
-    picture: bytes,
-    dark_picture: bytes,
-    film: bytes | None,
+    played: str,
+    wanted: str,
+    picture: str,
+    dark_picture: str,
+    film: str | None,
 ) -> str:
-    """Make the report as one self-contained HTML page.
+    """Make the report as one HTML page.
 
     Args:
         summary: the performance's row of `pianomime.evaluation.summary.summarize`.
         version: version of PianoMime.
-        played: MP3 of the performance.
-        wanted: MP3 of the score.
-        picture: PNG of the piano roll for light pages.
-        dark_picture: PNG of the piano roll for dark pages.
-        film: MP4 of the performance, or None.
+        played: address of the sound of the performance, see `source`.
+        wanted: of the sound of the score.
+        picture: of a picture of the piano roll for light pages.
+        dark_picture: of one for dark pages.
+        film: of the film of the performance, or None.
     """
     tiles = (
         f"<div><dt>{label}</dt><dd>{summary[name]:.3f}</dd></div>\n"
@@ -149,7 +157,7 @@ def page(
     if film is not None:
         film_section = (
             "<section>\n<h2>Video</h2>\n"
-            f'<video controls preload="metadata" src="{_data("video/mp4", film)}"></video>\n'
+            f'<video controls preload="metadata" src="{film}"></video>\n'
             "</section>\n"
         )
     if summary["blow_ups"]:
@@ -166,12 +174,20 @@ def page(
         rows="".join(rows),
         film=film_section,
         warning=warning,
-        played=_data("audio/mpeg", played),
-        wanted=_data("audio/mpeg", wanted),
-        picture=_data("image/png", picture),
-        dark_picture=_data("image/png", dark_picture),
+        played=played,
+        wanted=wanted,
+        picture=picture,
+        dark_picture=dark_picture,
     )
 
 
-def _data(kind: str, content: bytes) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
+def source(kind: str, file: Path) -> str:
+    """Address of a file for the page: its content, or for large ones its name.
+
+    Args:
+        kind: media type, such as "audio/mpeg".
+        file: in the folder of the page.
+    """
+    if file.stat().st_size > MOST_EMBEDDED:
+        return quote(file.name)
+    return f"data:{kind};base64,{base64.b64encode(file.read_bytes()).decode()}"

@@ -6,7 +6,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.music.sound import SAMPLE_RATE
+from pianomime.music.wav import WavFile
 from pianomime.progress import Progress, no_progress
 from pianomime.world.model import build_spec
 from pianomime.world.scene_look import CAMERAS, LAMP_OFF, dress, key_colours
@@ -35,7 +36,9 @@ _PICTURE_OVERSIZE = 2.0
 _SILENCED = ("disable", "disabled", "off", "false", "0")
 _SHRINKING = av.video.reformatter.Interpolation.AREA
 _PROBE = """
-import importlib, sys, mujoco
+import importlib, signal, sys, mujoco
+# A driver may hang, and whoever waits for it may be killed meanwhile.
+getattr(signal, "alarm", int)(int(sys.argv[2]))
 context = importlib.import_module("mujoco." + sys.argv[1]).GLContext(64, 64)
 context.make_current()
 mujoco.MjrContext(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
@@ -188,10 +191,10 @@ def write_video(
     path: str | os.PathLike[str],
     qpos: NDArray[np.float64],
     pressed: NDArray[np.bool_],
-    audio: NDArray[np.float32] | None,
+    audio: NDArray[np.float32] | WavFile | None,
     sample_rate: int = SAMPLE_RATE,
     *,
-    colours: NDArray[np.float32] | None = None,
+    colours: Callable[[int], NDArray[np.float32]] | None = None,
     view: View | None = None,
     progress: Progress = no_progress,
 ) -> None:
@@ -206,7 +209,8 @@ def write_video(
         pressed: (T, 88) bool, keys to show as pressed.
         audio: (S, 2) sound, -1..1, or None for a silent video.
         sample_rate: of the sound [Hz].
-        colours: (T, 88, 3) colour of each key, 0..1; None for those of `key_colours(pressed)`.
+        colours: gives the colours (88, 3) of the keys in a frame, 0..1; None for those of
+            `key_colours(pressed)`.
         view: camera and size.
         progress: called after every frame, in the phase "rendering".
 
@@ -220,9 +224,7 @@ def write_video(
         raise ValueError("a performance without frames cannot be rendered")
     if pressed.shape != (frames, KEYS):
         raise ValueError(f"pressed must be ({frames}, {KEYS}), not {pressed.shape}")
-    if colours is not None and colours.shape != (frames, KEYS, 3):
-        raise ValueError(f"colours must be ({frames}, {KEYS}, 3), not {colours.shape}")
-    if audio is not None and (audio.ndim != 2 or audio.shape[1] != 2):
+    if audio is not None and (len(audio.shape) != 2 or audio.shape[1] != 2):
         raise ValueError(f"audio must be (S, 2), not {audio.shape}")
     if view.size[0] % 2 or view.size[1] % 2:
         raise ValueError(f"H.264 needs an even size, not {view.size[0]}x{view.size[1]}")
@@ -233,7 +235,7 @@ def write_video(
     ):
         file, pictures, sound = streams
         for frame in range(frames):
-            shown = key_colours(pressed[frame]) if colours is None else colours[frame]
+            shown = key_colours(pressed[frame]) if colours is None else colours(frame)
             picture = _video_frame(painter.paint(qpos[frame], shown)).reformat(
                 *view.size, "yuv420p", interpolation=_SHRINKING
             )
@@ -278,7 +280,9 @@ def _video_frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
     return av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
 
 
-def _sound(audio: NDArray[np.float32], start: int, end: int, sample_rate: int) -> av.AudioFrame:
+def _sound(
+    audio: NDArray[np.float32] | WavFile, start: int, end: int, sample_rate: int
+) -> av.AudioFrame:
     """Samples start..end as a frame to encode, padded with silence after the end of the sound."""
     samples = np.zeros((2, end - start), np.float32)
     there = audio[start:end].T
@@ -331,7 +335,7 @@ def _works(backend: str) -> bool:
     """Try a backend in a process of its own, because a broken driver can crash its process."""
     try:
         probe = subprocess.run(
-            [sys.executable, "-c", _PROBE, backend],
+            [sys.executable, "-c", _PROBE, backend, str(_PROBE_SECONDS)],
             # With an unknown name here, importing mujoco itself fails.
             env={**os.environ, "MUJOCO_GL": backend},
             stdin=subprocess.DEVNULL,
