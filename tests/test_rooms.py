@@ -13,8 +13,9 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "pianomime"
 
 ROOMS = (
-    ("errors", "keyboard", "progress"),
-    ("files", "archive", "validation", "workers"),
+    ("errors", "installation", "keyboard", "palette", "progress", "shown", "stop"),
+    ("file_names", "staging", "schema", "seal"),
+    ("files", "archive", "local_server", "sealed_json", "validation", "web_page", "workers"),
     ("music",),
     ("songs",),
     ("world",),

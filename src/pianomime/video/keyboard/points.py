@@ -120,7 +120,14 @@ def parse_points(text: str, path: Path) -> NamedPoints:
         given = content["points"]
         names = list(given)
         pixels = np.array([given[name] for name in names], np.float64).reshape(-1, 2)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+    ) as error:
         raise InputError(f'{path}: must hold {{"points": {{NAME: [COLUMN, ROW], ...}}}}') from error
     if len(names) < 4 or not np.isfinite(pixels).all():
         raise InputError(f"{path}: at least 4 points of two finite numbers are needed")
