@@ -37,15 +37,29 @@ class ImportDemos:
             InputError: the data are not what they should be.
             OSError: a file cannot be read or written.
         """
+        from pianomime.commands.needs import need_folder, need_packages
         from pianomime.commands.progress import bars
+        from pianomime.errors import InputError
+        from pianomime.file_names import file_name
+        from pianomime.shown import shown
+        from pianomime.validation import within
+
+        if not self.source.exists():
+            raise InputError(f"{self.source}: does not exist")
+        if self.source.is_dir():
+            need_packages("video", ("zarr",))
+        if self.clips is not None:
+            within("clips", self.clips, 1)
+        out = self.out or Path("out", f"demos-{file_name(self.source.resolve().stem)}")
+        need_folder(out)
         from pianomime.files import staged
         from pianomime.learn.data.published import read_published
 
-        out = self.out or Path("out", f"demos-{self.source.stem}")
         number = 0
         with staged(out, ()) as folder, bars() as progress:
+            progress("reading", 0, 0)
             for demonstration, total in read_published(self.source, self.clips):
-                demonstration.save(folder / f"{demonstration.score.title}.npz")
+                demonstration.save(folder / f"{file_name(demonstration.score.title)}.npz")
                 number += 1
                 progress("importing", number, total)
-        print(f"saved {number} demonstrations: {out}")
+        print(f"saved {number} demonstrations: {shown(out)}")

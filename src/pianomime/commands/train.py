@@ -10,7 +10,15 @@ import tyro
 
 from pianomime.commands.named import option_value
 from pianomime.errors import InputError
-from pianomime.learn.imitation.config import POLICIES, PolicyConfig, PolicyName, Size, policy_config
+from pianomime.learn.imitation.config import (
+    POLICIES,
+    PolicyConfig,
+    PolicyName,
+    Size,
+    check_sources,
+    policy_config,
+)
+from pianomime.shown import shown
 
 
 @dataclass(frozen=True)
@@ -23,6 +31,11 @@ class Train:
     TensorBoard. The same command again resumes a training that was stopped. Set
     PIANOMIME_WEIGHTS=OUT to play with the policies in OUT.
 
+    Policies:
+      from goals to fingertips: high-diff, high-diff-no-sdf, high-bet
+      from fingertips to controls: low-diff, low-diff-no-sdf, low-diff-res, low-bet, low-mse
+      from goals straight to controls: one-stage-diff, bc-mse
+
     Examples:
       pianomime train high-diff --experts dagger.zarr
       pianomime train low-diff --experts dagger.zarr
@@ -31,11 +44,13 @@ class Train:
     """
 
     policy: Annotated[tyro.conf.Positional[PolicyName], tyro.conf.arg(metavar="POLICY")]
-    """Name of the policy."""
+    """Name of the policy, see above."""
     demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
-    """For high levels, instead of --experts: a folder of demonstrations, or the published ones
-    (.npz)."""
-    experts: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DATA...")] = ()
+    """For high levels, instead of --experts: a folder of demonstrations, or an .npz file of
+    PianoMime's published ones."""
+    experts: Annotated[
+        tuple[Path, ...], tyro.conf.arg(metavar="DATA...", help_behavior_hint="")
+    ] = ()
     """Data sets made by `pianomime collect-dagger` or `pianomime collect`."""
     goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """Folder of the goal encoder; OUT/goal if not given."""
@@ -72,7 +87,10 @@ class Train:
 
         if _kind(self.config) != _kind(policy_config(self.policy)):
             raise InputError(f"name the policy first: pianomime train {self.policy} ...")
+        goal = self.goal or self.out / "goal"
+        self._check_needs(goal)
         with extra("train"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.imitation.training import train_policy
 
             file = train_policy(
@@ -81,10 +99,29 @@ class Train:
                 self.out,
                 self.demonstrations,
                 self.experts,
-                self.goal or self.out / "goal",
+                goal,
                 progress,
             )
-        print(f"saved: {file}")
+        print(f"saved: {shown(file)}")
+
+    def _check_needs(self, goal: Path) -> None:
+        from pianomime.commands.needs import (
+            need_data_set,
+            need_demonstrations,
+            need_folder,
+            need_goal_encoder,
+            need_packages,
+        )
+
+        check_sources(self.policy, self.config, self.demonstrations, self.experts)
+        need_packages("train")
+        if self.demonstrations is not None:
+            need_demonstrations(self.demonstrations)
+        for data in self.experts:
+            need_data_set(data)
+        if self.config.goal_encoding == "sdf":
+            need_goal_encoder(goal, self.policy)
+        need_folder(self.out)
 
 
 def _kind(config: PolicyConfig) -> tuple[str, str, str, bool]:

@@ -10,8 +10,10 @@ import tyro
 
 from pianomime.commands.extras import extra
 from pianomime.commands.named import option_value
+from pianomime.file_names import file_name
 from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.learn.expert.config import ExpertConfig, preset_config
+from pianomime.shown import command_word, shown
 
 PresetName = Literal["paper", "best"]
 
@@ -59,16 +61,21 @@ class TrainExpert:
             InputError: the song or the folder cannot be used.
             OSError: a file cannot be read or written.
         """
+        from pianomime.commands.needs import need_folder, need_packages, need_piece
         from pianomime.commands.progress import bars
 
-        with extra("train"):
+        out = self.out or Path("out", f"expert-{file_name(Path(self.song).stem)}-{self.preset}")
+        need_packages("train")
+        need_piece(self.song)
+        need_folder(out)
+        with extra("train"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.expert.expert import train_expert
-        out = self.out or Path("out", f"expert-{Path(self.song).stem}-{self.preset}")
-        with bars() as progress, extra("train"):
+
             run = train_expert(
                 self.song, out, self.config, self.start, self.seconds, progress=progress
             )
         best = run.best()[1]
         print(f"F1 {best['f1']:.3f} after {best['steps']} steps")
-        print(f"saved: {out}")
-        print(f"play it: pianomime play {self.song} --player {out}")
+        print(f"saved: {shown(out)}")
+        print(f"play it: pianomime play {command_word(self.song)} --player {command_word(out)}")

@@ -11,8 +11,11 @@ import tyro
 from pianomime.commands.extras import extra
 from pianomime.commands.named import option_value
 from pianomime.commands.train_expert import PresetName
+from pianomime.errors import InputError
+from pianomime.file_names import file_name
 from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.learn.expert.config import ExpertConfig, preset_config
+from pianomime.shown import shown
 
 
 @dataclass(frozen=True)
@@ -63,12 +66,26 @@ class TrainExperts:
             InputError: there are no songs, or the folder or the cluster cannot be used.
             OSError: a file cannot be read or written.
         """
+        from pianomime.commands.needs import RAY, need_folder, need_packages
         from pianomime.commands.progress import bars
+        from pianomime.validation import within
 
-        with extra("train"):
+        if self.jobs is not None:
+            within("jobs", self.jobs, 1)
+        # `.` and `..` have no name of their own.
+        out = self.out or Path(
+            "out", f"experts-{file_name(self.folder.resolve().name)}-{self.preset}"
+        )
+        need_packages("train")
+        if self.ray is not None:
+            need_packages("scale", RAY)
+        if not self.folder.is_dir():
+            raise InputError(f"{self.folder}: is not a folder; one song: `pianomime train-expert`")
+        need_folder(out)
+        with extra("train" if self.ray is None else "scale"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.expert.many import experts_table, train_experts
-        out = self.out or Path("out", f"experts-{self.folder.name}-{self.preset}")
-        with bars() as progress, extra("train" if self.ray is None else "scale"):
+
             rows = train_experts(
                 self.folder,
                 out,
@@ -80,4 +97,4 @@ class TrainExperts:
                 progress,
             )
         print(experts_table(rows))
-        print(f"saved: {out / 'experts.json'}")
+        print(f"saved: {shown(out / 'experts.json')}")

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import tyro
 
-from pianomime.learn.fingers.config import FingersConfig
+from pianomime.learn.fingers.config import VALIDATION_SONGS, FingersConfig
+from pianomime.shown import shown
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,10 @@ class TrainFingers:
       PIANOMIME_WEIGHTS=out/generalist pianomime play SONG.mid --player fingers
     """
 
-    folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER...")]
+    folders: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]],
+        tyro.conf.arg(metavar="FOLDER...", help_behavior_hint="(required)"),
+    ]
     """Folders of MIDI files, searched recursively."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
     """Folder for the result."""
@@ -43,9 +47,14 @@ class TrainFingers:
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.extras import extra
+        from pianomime.commands.needs import need_folder, need_packages, need_songs
         from pianomime.commands.progress import bars
 
+        need_packages("train")
+        need_songs(self.folders, VALIDATION_SONGS + 1)
+        need_folder(self.out)
         with extra("train"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.fingers.training import train_fingers
 
             file, metrics = train_fingers(
@@ -55,4 +64,4 @@ class TrainFingers:
             f"F1 on validation songs: {metrics['validation/f1']:.4f}, "
             f"without the residual {metrics['validation/f1_base']:.4f}"
         )
-        print(f"saved: {file}")
+        print(f"saved: {shown(file)}")

@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from pianomime.learn.goal.config import GoalConfig
+from pianomime.shown import shown
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,10 @@ class TrainGoal:
       pianomime train-goal FOLDER FOLDER -o out/generalist/goal --trainer.steps 20000
     """
 
-    folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER...")]
+    folders: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]],
+        tyro.conf.arg(metavar="FOLDER...", help_behavior_hint="(required)"),
+    ]
     """Folders of MIDI files, searched recursively."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist/goal")
     """Folder for the result."""
@@ -39,9 +43,14 @@ class TrainGoal:
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.extras import extra
+        from pianomime.commands.needs import need_folder, need_packages, need_songs
         from pianomime.commands.progress import bars
 
+        need_packages("train")
+        need_songs(self.folders, 2)
+        need_folder(self.out)
         with extra("train"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.goal.training import train_goal
 
             metrics, goals = train_goal(self.folders, self.out, self.config, progress)
@@ -56,4 +65,4 @@ class TrainGoal:
             f"{metrics.code_correlation:.3f} "
             f"(between keys and between goals: {metrics.key_correlation:.3f})"
         )
-        print(f"saved: {self.out}")
+        print(f"saved: {shown(self.out)}")

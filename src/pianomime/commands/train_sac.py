@@ -9,6 +9,7 @@ from typing import Annotated
 import tyro
 
 from pianomime.learn.sac.config import SacConfig
+from pianomime.shown import shown
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,10 @@ class TrainSac:
       PIANOMIME_WEIGHTS=out/generalist pianomime play SONG.mid --player multi-task-sac
     """
 
-    folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER...")]
+    folders: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]],
+        tyro.conf.arg(metavar="FOLDER...", help_behavior_hint="(required)"),
+    ]
     """Folders of MIDI files, searched recursively."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
     """Folder for the result."""
@@ -42,10 +46,15 @@ class TrainSac:
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.extras import extra
+        from pianomime.commands.needs import need_folder, need_packages, need_songs
         from pianomime.commands.progress import bars
 
+        need_packages("train")
+        need_songs(self.folders)
+        need_folder(self.out)
         with extra("train"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.sac.training import train_sac
 
             file = train_sac(self.folders, self.out, self.config, self.threads, progress)
-        print(f"saved: {file}")
+        print(f"saved: {shown(file)}")

@@ -136,8 +136,11 @@ def test_what_is_missing_is_named(data, tmp_path):
         train_policy("high-diff", config, tmp_path, None, [], None)
     with pytest.raises(InputError, match="--experts"):
         train_policy("low-diff", policy_config("low-diff"), tmp_path, None, [], None)
-    for policy, experts in (("low-diff", []), ("high-diff", [data / "experts.zarr"])):
-        with pytest.raises(InputError, match="for high levels"):
+    for policy, experts, message in (
+        ("low-diff", [], "low-diff learns controls"),
+        ("high-diff", [data / "experts.zarr"], "one of the two"),
+    ):
+        with pytest.raises(InputError, match=message):
             train_policy(policy, policy_config(policy), tmp_path, data / "demos", experts, None)
     with pytest.raises(InputError, match="does not exist"):
         train_policy("high-diff", config, tmp_path, data / "demos", [], tmp_path / "none")
@@ -147,7 +150,7 @@ def test_what_is_missing_is_named(data, tmp_path):
         train_policy("high-diff-no-sdf", NO_SDF, tmp_path, tmp_path / "alone", [], None)
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="nothing to train on"):
-        train_policy("high-diff", config, tmp_path, tmp_path / "empty", [], None)
+        train_policy("high-diff-no-sdf", NO_SDF, tmp_path, tmp_path / "empty", [], None)
 
 
 def test_experts_with_another_base_controller_are_refused(data, tmp_path):

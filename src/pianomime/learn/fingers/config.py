@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 from pianomime.errors import InputError
 from pianomime.keyboard import EXCERPT_SECONDS
-from pianomime.validation import above_zero, within
+from pianomime.validation import above_zero, whole_numbers, widths, within
+
+VALIDATION_SONGS = 8
+"""Songs that are kept from training, on which the F1 is measured."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class FingersConfig:
     """Seed of all random numbers."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         for name in ("total_steps", "num_envs", "steps_per_update", "n_epochs"):
             within(name, getattr(self, name), 1)
         within("batch_size", self.batch_size, 2)
@@ -52,8 +56,7 @@ class FingersConfig:
             within(name, getattr(self, name), 0, 1)
         for name in ("action_cost", "wrong_key_cost", "seed"):
             within(name, getattr(self, name), 0)
-        for width in self.hidden:
-            within("hidden", width, 1)
+        widths("hidden", self.hidden)
         if self.steps_per_update % self.num_envs:
             raise InputError(
                 f"steps-per-update ({self.steps_per_update}) must be a multiple of num-envs "

@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 from collections.abc import Sequence
 from contextlib import closing
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,12 @@ from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
+from pianomime.errors import InputError
 from pianomime.files import files_digest
 from pianomime.learn.envs.checkpoint_callback import ResumableCallback
 from pianomime.learn.envs.reference import load_score
 from pianomime.learn.expert.ppo_model import Ppo, actor_network
-from pianomime.learn.fingers.config import FingersConfig
+from pianomime.learn.fingers.config import VALIDATION_SONGS, FingersConfig
 from pianomime.learn.fingers.env import FingersVecEnv, PlannedSong
 from pianomime.learn.imitation.export import export_network
 from pianomime.learn.runs.log import RunLog
@@ -35,8 +37,6 @@ from pianomime.songs.find import find_songs
 from pianomime.track import DynamicTracker, Tracker
 from pianomime.validation import within
 
-_VALIDATION_SONGS = 8
-"""Songs that are kept from training, on which the F1 is measured."""
 _CHECKPOINT_UPDATES = 20
 """Updates between checkpoints."""
 
@@ -55,7 +55,8 @@ def train_fingers(
         out: folder; `fingers.onnx` is the result, and `fingers` holds the training.
         config: how to train it.
         threads: of the physics and of the network; 0 for one on each core.
-        progress: called with the songs that are planned, then the frames that were played.
+        progress: called with the songs that are planned, the frames that were played, and the
+            songs that it is evaluated on.
 
     Returns:
         The ONNX file, and the mean F1 on the validation songs: `validation/f1` with the residual
@@ -69,17 +70,22 @@ def train_fingers(
     # Each content once, by its digest: which are kept hardly depends on what else there is.
     contents = {hashlib.sha256(path.read_bytes()).hexdigest(): path for path in find_songs(folders)}
     paths = [contents[digest] for digest in sorted(contents)]
-    within("number of songs", len(paths), _VALIDATION_SONGS + 1)
+    if len(paths) <= VALIDATION_SONGS:
+        raise InputError(
+            f"{VALIDATION_SONGS + 1} different songs at least are needed, {VALIDATION_SONGS} of "
+            f"them for validation; there are {len(paths)}"
+        )
     result = out / f"{FINGERS}.onnx"
     content = {**dataclasses.asdict(config), "data": files_digest(paths)[:16]}
     with RunFolder.open(out / FINGERS, FINGERS, content) as folder:
         if folder.has_result and result.exists():
             return result, folder.result()[1]
         songs = []
+        progress("planning", 0, len(paths))
         for done, song in enumerate(paths, 1):
             songs.append(PlannedSong.of(load_score(song, 0.0, config.seconds)))
             progress("planning", done, len(paths))
-        validation, train = songs[:_VALIDATION_SONGS], songs[_VALIDATION_SONGS:]
+        validation, train = songs[:VALIDATION_SONGS], songs[VALIDATION_SONGS:]
         env = FingersVecEnv(train, config, threads)
         model = _model(env, config)
         model.threads = threads or torch.get_num_threads()
@@ -90,7 +96,7 @@ def train_fingers(
             model.set_logger(Logger(None, []))
             callback.learn(model, config.total_steps * AGENTS, state, folder.path)
         network = actor_network(model).eval()
-        metrics = _evaluate(validation, network)
+        metrics = _evaluate(validation, network, progress)
         weights = {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}
         # A file of another training must not be taken for the result if the export fails.
         result.unlink(missing_ok=True)
@@ -162,21 +168,23 @@ class _Callback(ResumableCallback):
         self._progress("training", done, self._config.total_steps, f"reward {reward:.4f}")
 
 
-def _evaluate(songs: list[PlannedSong], network: nn.Module) -> dict[str, float]:
+def _evaluate(songs: list[PlannedSong], network: nn.Module, progress: Progress) -> dict[str, float]:
     """Mean F1 of songs with the finger residual, and with the dynamic tracker alone."""
 
     def run(inputs: dict[str, NDArray[Any]]) -> list[NDArray[np.float32]]:
         with torch.inference_mode():
             return [network(torch.from_numpy(inputs["observation"])).numpy()]
 
+    trackers: dict[str, Tracker] = {
+        "validation/f1_base": DynamicTracker(),
+        "validation/f1": FingerResidualTracker(run),
+    }
+    f1: dict[str, list[float]] = {name: [] for name in trackers}
     with torch_threads(1):
-        return {
-            name: float(np.mean([_f1(song.demonstration, tracker) for song in songs]))
-            for name, tracker in (
-                ("validation/f1_base", DynamicTracker()),
-                ("validation/f1", FingerResidualTracker(run)),
-            )
-        }
+        for done, (name, song) in enumerate(product(trackers, songs)):
+            progress("evaluating", done, len(trackers) * len(songs))
+            f1[name].append(_f1(song.demonstration, trackers[name]))
+    return {name: float(np.mean(values)) for name, values in f1.items()}
 
 
 def _f1(song: Demonstration, tracker: Tracker) -> float:

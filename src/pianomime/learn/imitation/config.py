@@ -6,15 +6,17 @@ command line does, such as `diffusion.channels`. Cheap to import: no numpy, no t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 import tyro
 
 from pianomime.errors import InputError
 from pianomime.learn.runs.trainer_config import TrainerConfig
-from pianomime.policies.horizon import CHUNK
-from pianomime.validation import above_zero, one_of, within
+from pianomime.policies.horizon import CHUNK, MOST_DIFFUSION_STEPS
+from pianomime.validation import above_zero, one_of, whole_numbers, widths, within
 
 Size = Literal["small", "paper"]
 PolicyName = Literal[
@@ -61,6 +63,7 @@ class DiffusionConfig:
     """What the network predicts: the noise, or the chunk without it."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self, "diffusion")
         levels = len(self.channels)
         if not levels or CHUNK % 2 ** (levels - 1):
             raise InputError(
@@ -81,7 +84,7 @@ class DiffusionConfig:
             raise InputError(
                 f"diffusion.step-embedding must be even, from 4 on, not {self.step_embedding}"
             )
-        within("diffusion.steps", self.steps, 2)
+        within("diffusion.steps", self.steps, 2, MOST_DIFFUSION_STEPS)
         one_of("diffusion.prediction", self.prediction, ("epsilon", "sample"))
 
 
@@ -101,6 +104,7 @@ class BetConfig:
     """Weight of the loss of the correction, beside that of the choice of a bin."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self, "bet")
         for name, least in (("layers", 1), ("heads", 1), ("width", 1), ("bins", 2)):
             within(f"bet.{name}", getattr(self, name), least)
         if self.width % self.heads:
@@ -118,8 +122,8 @@ class MlpConfig:
     """Widths of the hidden layers."""
 
     def __post_init__(self) -> None:
-        for width in self.hidden:
-            within("mlp.hidden", width, 1)
+        whole_numbers(self, "mlp")
+        widths("mlp.hidden", self.hidden)
 
 
 _DEFAULTS = {"diffusion": DiffusionConfig(), "bet": BetConfig(), "mlp": MlpConfig()}
@@ -219,6 +223,35 @@ _PAPER = {
 
 _PAPER_SAMPLES = 110_000
 """Pairs of state and action in the paper's data."""
+
+
+def check_sources(
+    name: str, config: PolicyConfig, demonstrations: Path | None, experts: Sequence[Path]
+) -> None:
+    """Refuse to train a policy on data that it cannot learn from; whether they exist is not asked.
+
+    Args:
+        name: of the policy.
+        config: of the policy.
+        demonstrations: where high levels find demonstrations; None to learn from `experts`.
+        experts: data sets of trajectories.
+
+    Raises:
+        InputError: there are none, of both kinds, or of the wrong one.
+    """
+    if demonstrations is not None and experts:
+        raise InputError("--demonstrations and --experts: name one of the two")
+    if demonstrations is not None and config.level != "high":
+        raise InputError(
+            f"{name} learns controls, which demonstrations do not have: name data sets made by "
+            "`pianomime collect-dagger` with --experts"
+        )
+    if demonstrations is None and not experts:
+        more = ", or demonstrations with --demonstrations" if config.level == "high" else ""
+        raise InputError(
+            f"{name} needs data: name data sets made by `pianomime collect-dagger` with "
+            f"--experts{more}"
+        )
 
 
 def policy_config(name: PolicyName, size: Size = "small") -> PolicyConfig:

@@ -19,7 +19,7 @@ from pianomime.learn.data.dataset import (
     demonstration_dataset,
     trajectory_dataset,
 )
-from pianomime.learn.imitation.config import PolicyConfig
+from pianomime.learn.imitation.config import PolicyConfig, check_sources
 from pianomime.learn.imitation.export import export_policy, policy_info, torch_policy
 from pianomime.learn.imitation.network import PolicyNetwork
 from pianomime.learn.imitation.samples import Samples
@@ -53,7 +53,7 @@ def train_policy(
         demonstrations: what high levels learn from, see `demonstration_dataset`; `experts` if None.
         experts: data sets that all others learn from, see `trajectory_dataset`.
         goal: folder of the goal encoder, where goals are encoded.
-        progress: called with the updates that were done.
+        progress: called as the data are read, and with the updates that were done.
 
     Returns:
         The ONNX file.
@@ -62,7 +62,7 @@ def train_policy(
         InputError: data are missing or cannot be used, or the folder holds another training.
         OSError: a file cannot be read or written.
     """
-    dataset = _dataset(config, demonstrations, experts)
+    check_sources(name, config, demonstrations, experts)
     encoder = None
     if config.goal_encoding == "sdf":
         if goal is None:
@@ -70,6 +70,8 @@ def train_policy(
         from pianomime.learn.goal.training import load_encoder
 
         encoder = load_encoder(goal)
+    progress("reading", 0, 0)
+    dataset = _dataset(config, demonstrations, experts)
     if len(set(dataset.song_id.tolist())) < 2:
         raise InputError("two songs at least are needed, one of them for validation")
     train, validation = (Samples.of(part, config) for part in dataset.split())
@@ -100,6 +102,7 @@ def train_policy(
         },
         held_out=validation.evenly(_VALIDATION_SAMPLES),
     )
+    progress("exporting", 0, 0)
     result = out / f"{name}.onnx"
     export_policy(network, policy_info(network, name, digest), result)
     return result
@@ -107,11 +110,7 @@ def train_policy(
 
 def _dataset(config: PolicyConfig, demonstrations: Path | None, experts: Sequence[Path]) -> Dataset:
     if demonstrations is not None:
-        if config.level != "high" or experts:
-            raise InputError("--demonstrations are for high levels, and instead of --experts")
         return demonstration_dataset(demonstrations)
-    if not experts:
-        raise InputError("it needs --experts, data sets made by `pianomime collect-dagger`")
     if config.level == "high":
         return trajectory_dataset(experts, DEMONSTRATION_COLUMNS)
     return trajectory_dataset(experts, TRAJECTORY_COLUMNS, "ik" if config.residual else "")
