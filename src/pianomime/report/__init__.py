@@ -1,9 +1,9 @@
 """Reports: pictures, sound and a page of a performance, and pictures of a diagnosis."""
 
 from pianomime.keyboard import key_name
+from pianomime.palette import DARK, LIGHT, Theme
 from pianomime.report.diagnosis import DIAGNOSIS_FILES, write_diagnosis
 from pianomime.report.picture import draw
-from pianomime.report.roll import DARK, LIGHT, Theme
 from pianomime.report.write import FILES, write_report
 
 __all__ = [

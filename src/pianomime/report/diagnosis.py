@@ -11,8 +11,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pianomime.evaluation.diagnose import Cause, Diagnosis, Fault, Total, diagnose, totals
+from pianomime.palette import LIGHT
 from pianomime.players.performance import Performance
-from pianomime.report.roll import LEFT_EDGE, LIGHT, RIGHT_EDGE, Layer, Lines, corners, runs, sheet
+from pianomime.report.roll import (
+    LEFT_EDGE,
+    RIGHT_EDGE,
+    Layer,
+    Lines,
+    corners,
+    runs,
+    save,
+    sheet,
+)
 
 DIAGNOSIS_FILES = ("diagnosis.json", "diagnosis.png")
 """All files that `write_diagnosis` writes."""
@@ -86,7 +96,7 @@ def _draw(performances: Sequence[Performance], diagnoses: Sequence[Diagnosis], p
     if lines:
         layers = _layers(performances[0], diagnoses[0].faults)
         lines.draw(figure, layers, _THEME)
-    figure.savefig(path, format="png", facecolor=_THEME.paper)
+    save(figure, path, _THEME)
 
 
 def _draw_bars(figure: Figure, sums: Sequence[Total], high: float) -> None:

@@ -5,73 +5,32 @@ It holds everything itself, but for the sound and the film of long pieces, which
 
 from __future__ import annotations
 
-import base64
 from html import escape
 from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
 from pianomime.evaluation.summary import Row
+from pianomime.web_page import data_url, web_page
 
-_PAGE = Template("""\
-<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>$song - PianoMime</title>
-<style>
-:root {
-  --paper: #f3f5f8; --card: #ffffff; --text: #1c2430; --faint: #6b7686; --line: #dde1e7;
-  --accent: #2467c9;
-}
-@media (prefers-color-scheme: dark) {
-  :root {
-    --paper: #0f1216; --card: #171b21; --text: #e8ecf2; --faint: #8d98a8; --line: #2c333d;
-    --accent: #5b9bf0;
-  }
-}
-* { box-sizing: border-box; }
-body {
-  margin: 0; background: var(--paper); color: var(--text);
-  font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif;
-}
-main { max-width: 1120px; margin: 0 auto; padding: 2.5rem 1.25rem 3rem; }
-h1 { margin: 0; font-size: 1.9rem; line-height: 1.2; overflow-wrap: anywhere; }
-.under { margin: .35rem 0 1.6rem; color: var(--faint); }
-section {
-  background: var(--card); border: 1px solid var(--line); border-radius: 14px;
-  padding: 1.1rem 1.25rem; margin-bottom: 1.1rem;
-}
-h2 { margin: 0 0 .7rem; font-size: .95rem; font-weight: 600; color: var(--faint); }
+_STYLE = """\
 .tiles {
   display: grid; grid-template-columns: repeat(auto-fit, minmax(140px, 1fr)); gap: .9rem;
   padding: 0; margin: 0 0 1.1rem;
 }
 .tiles div {
-  background: var(--card); border: 1px solid var(--line); border-radius: 14px;
+  background: var(--paper); border: 1px solid var(--line); border-radius: 14px;
   padding: .85rem 1.1rem;
 }
 .tiles dt { color: var(--faint); font-size: .85rem; }
 .tiles dd { margin: 0; font-size: 1.65rem; font-weight: 650; font-variant-numeric: tabular-nums; }
-.tiles div:first-child dd { color: var(--accent); }
+.tiles div:first-child dd { color: var(--left); }
 .sounds {
   display: grid; grid-template-columns: repeat(auto-fit, minmax(280px, 1fr)); gap: 1rem;
 }
 .sounds p { margin: 0 0 .4rem; }
-audio, video, img { display: block; width: 100%; border-radius: 8px; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-td { padding: .35rem 0; border-top: 1px solid var(--line); vertical-align: top; }
-tr:first-child td { border-top: 0; }
-td:nth-child(2) { text-align: right; padding-left: 1rem; white-space: nowrap; }
-small { color: var(--faint); }
-.warning { border-left: 4px solid #d3124a; }
-footer { color: var(--faint); font-size: .85rem; }
-</style>
-</head>
-<body>
-<main>
+"""
+_BODY = Template("""\
 <h1>$song</h1>
 <p class="under">Played by two simulated Shadow hands &middot; player <b>$player</b>,
 effort $effort</p>
@@ -98,9 +57,6 @@ $rows</table>
 </section>
 <footer>Made by PianoMime $version. F1 compares the keys that are down in every twentieth of a
 second; onset F1 compares the beginnings of notes, within 50 ms.</footer>
-</main>
-</body>
-</html>
 """)
 
 _TILES = {
@@ -165,7 +121,7 @@ def page(
             '<section class="warning">The physics became unstable during this performance, and the '
             "hands were put back: the metrics may be worse than the player.</section>\n"
         )
-    return _PAGE.substitute(
+    body = _BODY.substitute(
         song=escape(str(summary["song"])),
         player=escape(str(summary["player"])),
         effort=summary["effort"],
@@ -179,6 +135,7 @@ def page(
         picture=picture,
         dark_picture=dark_picture,
     )
+    return web_page(f"{summary['song']} - PianoMime", body, _STYLE)
 
 
 def source(kind: str, file: Path) -> str:
@@ -190,4 +147,4 @@ def source(kind: str, file: Path) -> str:
     """
     if file.stat().st_size > MOST_EMBEDDED:
         return quote(file.name)
-    return f"data:{kind};base64,{base64.b64encode(file.read_bytes()).decode()}"
+    return data_url(kind, file.read_bytes())

@@ -10,9 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from pianomime.palette import LIGHT, Theme
 from pianomime.plan import LEFT, RIGHT
 from pianomime.players.performance import Performance
-from pianomime.report.roll import LIGHT, Layer, Lines, Theme, corners, legend, runs, sheet
+from pianomime.report.roll import Layer, Lines, corners, legend, runs, save, sheet
 
 _NOBODY = 2
 """Index, after LEFT and RIGHT, of the colour of notes that were assigned to no hand."""
@@ -42,7 +43,7 @@ def draw(performance: Performance, path: str | os.PathLike[str], theme: Theme = 
     pedal[..., 1] += lines.low - 3.1  # a strip below the keys
     layers.append(Layer(pedal, theme.hands[_NOBODY], theme.hands[_NOBODY]))
     lines.draw(figure, layers, theme)
-    figure.savefig(path, format="png", facecolor=theme.paper)
+    save(figure, path, theme)
 
 
 def _layers(performance: Performance, theme: Theme) -> list[Layer]:

@@ -1,20 +1,25 @@
-"""Common parts of pictures of piano rolls: colours, lines of music, heading, legend."""
+"""Common parts of pictures of piano rolls: lines of music, heading, legend."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pianomime.keyboard import BLACK, FRAME_RATE, KEYS, KEYS_PER_OCTAVE, LOWEST_PITCH, key_name
+from pianomime.palette import Theme
 from pianomime.players.performance import Performance
 
 WIDTH = 12.0
@@ -29,42 +34,10 @@ _MOST_ROWS = 24
 _FEWEST_KEYS = 3 * KEYS_PER_OCTAVE
 """Keys that a line shows at least."""
 _FOOT = 0.2  # [inches]
-
-
-@dataclass(frozen=True)
-class Theme:
-    """Colours of a picture; `hands` and `wanted` are those of left, right and no hand."""
-
-    paper: str
-    black_keys: str
-    lines: str
-    text: str
-    faint_text: str
-    hands: tuple[str, str, str]
-    wanted: tuple[str, str, str]
-    wrong: str
-
-
-LIGHT = Theme(
-    paper="#ffffff",
-    black_keys="#f5f6f8",
-    lines="#dde1e7",
-    text="#1c2430",
-    faint_text="#6b7686",
-    hands=("#2467c9", "#e58a00", "#8a94a3"),
-    wanted=("#cadcf6", "#fbe2b8", "#dfe3e8"),
-    wrong="#d3124a",
-)
-DARK = Theme(
-    paper="#171b21",
-    black_keys="#12151a",
-    lines="#2c333d",
-    text="#e8ecf2",
-    faint_text="#8d98a8",
-    hands=("#5b9bf0", "#f2a232", "#7d8795"),
-    wanted=("#22395c", "#503a16", "#343b45"),
-    wrong="#ff4d7d",
-)
+_BETWEEN = 0.2
+"""[inches] between title and remark at least."""
+_MOST_LETTERS = 100
+"""More letters of a title never fit."""
 
 
 class Layer(NamedTuple):
@@ -182,22 +155,49 @@ def sheet(height: float, title: str, remark: str, theme: Theme) -> Figure:
 
     Args:
         height: height of the picture [inches].
-        title: title, which is shortened if it is too long.
+        title: title, which is shortened where it would meet the remark.
         remark: one line.
         theme: the colours.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=110, facecolor=theme.paper)
-    figure.text(
-        LEFT_EDGE, 1 - 0.34 / height, title if len(title) <= 48 else f"{title[:47]}…",
+    heading = figure.text(
+        LEFT_EDGE, 1 - 0.34 / height, title[:_MOST_LETTERS],
         color=theme.text, fontsize=15, fontweight="bold", va="center",
         # A dollar sign in a title begins no formula.
         parse_math=False, usetex=False,
     )  # fmt: skip
-    figure.text(
+    beside = figure.text(
         RIGHT_EDGE, 1 - 0.34 / height, remark,
         color=theme.faint_text, fontsize=10.5, va="center", ha="right",
     )  # fmt: skip
+    with _letters_may_lack():
+        canvas = FigureCanvasAgg(figure).get_renderer()
+        end = beside.get_window_extent(canvas).x0 - _BETWEEN * figure.dpi
+        letters = len(heading.get_text())
+        while letters and heading.get_window_extent(canvas).x1 > end:
+            letters -= 1
+            heading.set_text(f"{title[:letters]}…")
     return figure
+
+
+def save(figure: Figure, path: str | os.PathLike[str], theme: Theme) -> None:
+    """Write a picture into a PNG file.
+
+    Args:
+        figure: made by `sheet`.
+        path: the file to write.
+        theme: the colours.
+    """
+    with _letters_may_lack():
+        figure.savefig(path, format="png", facecolor=theme.paper)
+
+
+@contextmanager
+def _letters_may_lack() -> Iterator[None]:
+    """A letter of a title that the font lacks is a box in the picture, and no warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        yield
 
 
 def legend(figure: Figure, entries: Sequence[Artist], theme: Theme) -> None:

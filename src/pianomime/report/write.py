@@ -15,12 +15,12 @@ from pianomime.evaluation.summary import Row, summarize
 from pianomime.music import Score
 from pianomime.music.sound import BLOCK_SECONDS, Sound
 from pianomime.music.wav import WavFile, write_wav_blocks
+from pianomime.palette import DARK, LIGHT
 from pianomime.players.performance import Performance
 from pianomime.progress import Progress, Steps, telling
 from pianomime.report.mp3 import write_mp3
 from pianomime.report.page import MOST_EMBEDDED, page, source
 from pianomime.report.picture import draw
-from pianomime.report.roll import DARK, LIGHT
 from pianomime.world.render import RenderUnavailable, write_video
 from pianomime.world.scene_look import key_colours
 
