@@ -186,7 +186,8 @@ class Film:
     def _open(self) -> Iterator[tuple[Any, Any]]:
         """The open file, and its stream of pictures."""
         try:
-            container = av.open(str(self.path))
+            # In full: a relative name such as `concat:x.mp4` would be taken for an address.
+            container = av.open(os.path.abspath(self.path))
         except FileNotFoundError:
             raise InputError(f"{self.path}: does not exist") from None
         except (av.error.FFmpegError, OSError) as error:
