@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pianomime.commands.extras import extra
 from pianomime.errors import InputError
-from pianomime.learn.data.format import is_data_set, zarr_attributes
+from pianomime.learn.data.format import is_data_set, training_songs, zarr_attributes
 from pianomime.learn.goal.config import RESULT
 from pianomime.songs.find import find_song, find_songs
 
@@ -154,12 +154,25 @@ def need_experts(path: Path) -> None:
             raise InputError(f"{folder}: nothing was trained in this run yet")
 
 
-def need_data_set(path: Path) -> None:
-    """Refuse what is no data set of `pianomime collect` or `pianomime collect-dagger`.
+def need_data_sets(paths: Sequence[Path]) -> None:
+    """Refuse what are no data sets of `pianomime collect` or `pianomime collect-dagger`.
 
     Raises:
-        InputError: it is not there, or something else; the message says what makes it.
+        InputError: one is not there, or something else, and the message says what makes it; or
+            there is but one song in them, and nothing to validate on.
     """
+    for path in paths:
+        _need_data_set(path)
+    songs = {key: name for path in paths for key, name in training_songs(path).items()}
+    if len(songs) == 1:
+        raise InputError(
+            "two songs at least are needed, one of them for validation; there is "
+            f"{', '.join(songs.values())} alone"
+        )
+
+
+def _need_data_set(path: Path) -> None:
+    # After `need_packages`: it needs safetensors.
     from pianomime.learn.runs.run import is_run
 
     if not path.exists():

@@ -106,7 +106,7 @@ class Train:
 
     def _check_needs(self, goal: Path) -> None:
         from pianomime.commands.needs import (
-            need_data_set,
+            need_data_sets,
             need_demonstrations,
             need_folder,
             need_goal_encoder,
@@ -117,8 +117,7 @@ class Train:
         need_packages("train")
         if self.demonstrations is not None:
             need_demonstrations(self.demonstrations)
-        for data in self.experts:
-            need_data_set(data)
+        need_data_sets(self.experts)
         if self.config.goal_encoding == "sdf":
             need_goal_encoder(goal, self.policy)
         need_folder(self.out)
