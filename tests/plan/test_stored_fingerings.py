@@ -18,7 +18,7 @@ from pianomime.plan.joint_path import smooth_path
 from pianomime.world.hand import Hand
 
 STORED = Path(__file__).with_name("fingerings.npz")
-NAMES = sorted({name.partition(":")[0] for name in np.load(STORED).files})
+NAMES = sorted({name.partition(":")[0] for name in np.load(STORED).files if ":" in name})
 
 
 @pytest.mark.parametrize("name", NAMES)

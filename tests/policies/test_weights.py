@@ -7,7 +7,7 @@ import pytest
 
 from pianomime import Score, excerpt, load_player, songs
 from pianomime.policies.methods import WEIGHTS, weights_folder
-from pianomime.policies.policy import load_network
+from pianomime.policies.network_file import load_network
 
 
 @pytest.fixture(autouse=True)

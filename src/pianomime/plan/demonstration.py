@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import zipfile
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,12 +17,32 @@ from pianomime.files import atomic
 from pianomime.keyboard import EXCERPT_SECONDS, FRAME_RATE, NO_KEY
 from pianomime.music import Score
 from pianomime.plan.fingertip_plan import FingertipPlan
+from pianomime.plan.plan_arrays import (
+    PLAN_SCHEMA,
+    SCORE_SCHEMA,
+    plan_arrays,
+    plan_of,
+    score_arrays,
+    score_of,
+)
+from pianomime.schema import Field, check_json
+from pianomime.sealed_json import parse_json
 
 TRAIN = "train"
 """Name of the split that is used for training."""
-_VERSION = 1
-_SCORE = ("key", "onset", "offset", "velocity", "pedal")
-_PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
+_MARK = "demonstration_version"
+"""The array that marks the file, which holds its version."""
+_VERSION = 2
+"""Of the file; version 1 had no digest."""
+_SCHEMA = {
+    "source": Field("text"),
+    "homography": Field("float", (3, 3), may_be_nan=True),
+    "quality": Field("text"),
+    "song_id": Field("int", (), -1),
+    "split": Field("text"),
+    **SCORE_SCHEMA,
+    **PLAN_SCHEMA,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,19 +129,15 @@ class Demonstration:
         Args:
             path: the file; its folder must exist.
         """
-        arrays: dict[str, NDArray[np.generic]] = {
-            "demonstration_version": np.array(_VERSION),
+        arrays: dict[str, NDArray[Any]] = {
+            _MARK: np.array(_VERSION),
             "source": np.array(self.source),
-            "score_title": np.array(self.score.title),
             "homography": self.homography,
             "quality": np.array(json.dumps(self.quality)),
             "song_id": np.array(self.song_id),
             "split": np.array(self.split),
         }
-        for name in _SCORE:
-            arrays[f"score_{name}"] = getattr(self.score, name)
-        for name in _PLAN:
-            arrays[f"plan_{name}"] = getattr(self.plan, name)
+        arrays |= score_arrays(self.score) | plan_arrays(self.plan)
         with atomic(path) as temporary:
             write_arrays(temporary, arrays)
 
@@ -133,26 +150,23 @@ class Demonstration:
 
         Raises:
             OSError: the file does not exist or cannot be read.
-            InputError: it is not a demonstration, or of an unknown version.
+            InputError: it is not a demonstration, of an unknown version, or damaged.
         """
-        return read_archive(
-            path, "a demonstration", ("demonstration_version", _VERSION), cls._from_arrays
-        )
+        version = _MARK, _VERSION
+        return read_archive(path, "a demonstration", version, _SCHEMA, cls._from_arrays)
 
     @classmethod
     def _from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Demonstration:
+        quality = parse_json(str(arrays["quality"]))
+        check_json(quality, Field("object"), "quality")
         return cls(
-            Score(
-                **{name: arrays[f"score_{name}"] for name in _SCORE},
-                title=str(arrays["score_title"]),
-            ),
-            FingertipPlan(**{name: arrays[f"plan_{name}"] for name in _PLAN}),
+            score_of(arrays),
+            plan_of(arrays),
             str(arrays["source"]),
             arrays["homography"],
-            json.loads(str(arrays["quality"])),
-            # Files of earlier versions lack these two.
-            int(arrays.get("song_id", arrays.get("song", -1))),
-            str(arrays.get("split", TRAIN)),
+            quality,
+            int(arrays["song_id"]),
+            str(arrays["split"]),
         )
 
 
@@ -185,6 +199,15 @@ class DemonstrationPlanner:
                 f"{shown.score.title}, {self.demonstration.score.duration:.1f} s"
             )
         return shown.plan
+
+
+def is_demonstration(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is a demonstration, of any version, rather than other arrays."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return f"{_MARK}.npy" in archive.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False
 
 
 def on_grid(score: Score) -> Score:

@@ -18,9 +18,9 @@ from pianomime.policies.methods import (
     SAMPLERS,
     load_finger_tracker,
     load_policy_tracker,
-    policy_path,
+    weight_files,
 )
-from pianomime.policies.policy import load_policy
+from pianomime.policies.network_file import load_policy
 from pianomime.track import (
     DynamicConfig,
     DynamicTracker,
@@ -93,9 +93,9 @@ def _demonstration_planner(demonstration: Demonstration | str | Path) -> Demonst
 def _generalist(method: str) -> PlayerFactory:
     def make(effort: int, seed: int, weights: str | Path | None = None, **settings: Any) -> Player:
         (sampler,) = configure(settings, sampler=SAMPLERS[effort])
-        *high, low = GENERALISTS[method]
-        tracker = load_policy_tracker(policy_path(low, weights), sampler, seed, low)
-        fingertips = load_policy(policy_path(high[0], weights), sampler, high[0]) if high else None
+        *high, low = zip(GENERALISTS[method], weight_files(method, weights), strict=True)
+        tracker = load_policy_tracker(low[1], sampler, seed, low[0])
+        fingertips = load_policy(high[0][1], sampler, high[0][0]) if high else None
         return GeneralistPlayer(method, tracker, fingertips, seed, effort)
 
     return make

@@ -7,7 +7,7 @@ rendered again without simulating.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,22 +18,39 @@ from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.music import Score, frame_metrics, notes_from_roll, onset_f1, pedal_f1
 from pianomime.plan import FingertipPlan
+from pianomime.plan.plan_arrays import (
+    PLAN_SCHEMA,
+    SCORE_SCHEMA,
+    plan_arrays,
+    plan_of,
+    score_arrays,
+    score_of,
+)
+from pianomime.schema import Field
 from pianomime.world.layout import LAYOUT
 
 _VELOCITY = 64
 """Of notes that nobody asked for."""
 
-_VERSION = 2
-_SCORE = ("key", "onset", "offset", "velocity", "pedal")
-_PLAN = ("fingertips", "finger_key", "note_hand", "note_finger")
-_COLUMNS = {
-    "ctrl": (LAYOUT.ctrl_size,),
-    "qpos": (LAYOUT.qpos_size,),
-    "key_state": (KEYS,),
-    "pressed": (KEYS,),
-    "pedal": (),
+_VERSION = 3
+"""Of the file; version 2 had no digest."""
+_FRAMES = {
+    "ctrl": Field("float", ("T", LAYOUT.ctrl_size)),
+    "qpos": Field("float", ("T", LAYOUT.qpos_size)),
+    "key_state": Field("float", ("T", KEYS), 0, 1),
+    "pressed": Field("bool", ("T", KEYS)),
+    "pedal": Field("bool", ("T",)),
+    "blow_ups": Field("int", ("B",), 0),
 }
-_FRAMES = (*_COLUMNS, "blow_ups")
+_SECONDS = {name: Field("float", (), 0) for name in ("plan_seconds", "simulate_seconds")}
+_PLAYER = {"player": Field("text"), "effort": Field("int", (), 0)}
+_SCHEMA = {
+    **_PLAYER,
+    **SCORE_SCHEMA,
+    **_FRAMES,
+    **_SECONDS,
+    **{name: replace(field, optional=True) for name, field in PLAN_SCHEMA.items()},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +91,10 @@ class Performance:
             ValueError: an array has another shape than it should.
         """
         frames = self.score.frames()
-        for name, columns in _COLUMNS.items():
-            shape = getattr(self, name).shape
-            if shape != (frames, *columns):
-                raise ValueError(f"{name} has shape {shape}, not {(frames, *columns)}")
+        for name, field in _FRAMES.items():
+            shape, wanted = getattr(self, name).shape, (frames, *field.shape[1:])
+            if name != "blow_ups" and shape != wanted:
+                raise ValueError(f"{name} has shape {shape}, not {wanted}")
         if not ((self.blow_ups >= 0) & (self.blow_ups < frames)).all():
             raise ValueError(f"blow_ups must be frames 0..{frames - 1}")
         if self.plan is not None:
@@ -114,7 +131,7 @@ class Performance:
         has the velocity that the score asks for.
         """
         key, onset, offset = notes_from_roll(self.pressed)
-        asked = np.zeros(self.pressed.shape, np.int64)
+        asked = np.zeros(self.pressed.shape, np.uint8)
         for note, (first, stop) in enumerate(self.score.note_frames()):
             asked[first:stop, self.score.key[note]] = self.score.velocity[note]
         velocity = np.full(len(key), _VELOCITY)
@@ -151,19 +168,12 @@ class Performance:
         Args:
             path: where to; its folder must exist.
         """
-        arrays: dict[str, NDArray[np.generic]] = {
-            "version": np.array(_VERSION),
-            "player": np.array(self.player),
-            "effort": np.array(self.effort),
-            "score_title": np.array(self.score.title),
-        }
-        for name in _SCORE:
-            arrays[f"score_{name}"] = getattr(self.score, name)
-        for name in (*_FRAMES, "plan_seconds", "simulate_seconds"):
+        arrays: dict[str, NDArray[Any]] = {"version": np.array(_VERSION)}
+        for name in (*_PLAYER, *_FRAMES, *_SECONDS):
             arrays[name] = np.asarray(getattr(self, name))
+        arrays |= score_arrays(self.score)
         if self.plan is not None:
-            for name in _PLAN:
-                arrays[f"plan_{name}"] = getattr(self.plan, name)
+            arrays |= plan_arrays(self.plan)
         with atomic(path) as temporary:
             write_arrays(temporary, arrays)
 
@@ -176,23 +186,21 @@ class Performance:
 
         Raises:
             OSError: there is no such file, or it cannot be read.
-            InputError: it is no performance, or one of a version that we do not know.
+            InputError: it is no performance, one of a version that we do not know, or damaged.
         """
-        return read_archive(path, "a performance", ("version", _VERSION), cls._from_arrays)
+        version = "version", _VERSION
+        return read_archive(path, "a performance", version, _SCHEMA, cls._from_arrays)
 
     @classmethod
     def _from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> Performance:
-        score = Score(
-            **{name: arrays[f"score_{name}"] for name in _SCORE}, title=str(arrays["score_title"])
-        )
-        plan = None
-        if "plan_fingertips" in arrays:
-            plan = FingertipPlan(**{name: arrays[f"plan_{name}"] for name in _PLAN})
+        planned = [name in arrays for name in PLAN_SCHEMA]
+        if any(planned) != all(planned):
+            raise ValueError("a part of the plan is missing")
         return cls(
-            score=score,
+            score=score_of(arrays),
             player=str(arrays["player"]),
             effort=int(arrays["effort"]),
-            plan=plan,
+            plan=plan_of(arrays) if all(planned) else None,
             **{name: arrays[name] for name in _FRAMES},
             plan_seconds=float(arrays["plan_seconds"]),
             simulate_seconds=float(arrays["simulate_seconds"]),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 
 from pianomime.errors import InputError
 from pianomime.policies.finger_residual import FingerResidualTracker
-from pianomime.policies.policy import load_network, load_policy
+from pianomime.policies.network_file import load_network, load_policy
 from pianomime.policies.policy_tracker import PolicyTracker
 from pianomime.policies.sampler import Sampler
 
@@ -72,9 +73,14 @@ def load_policy_tracker(
     return PolicyTracker(policy, seed, policy.info.level == "low", policy.info.residual)
 
 
+def bundled_weights() -> Path:
+    """The folder of the weights that come with the program."""
+    return Path(__file__).with_name("weights")
+
+
 def weights_folder() -> Path:
     """The folder of weights, unless another one is given: that in the environment, or ours."""
-    return Path(os.environ.get(WEIGHTS) or Path(__file__).with_name("weights"))
+    return Path(os.environ.get(WEIGHTS) or bundled_weights())
 
 
 def policy_path(name: str, weights: str | Path | None = None) -> Path:
@@ -98,13 +104,49 @@ def policy_path(name: str, weights: str | Path | None = None) -> Path:
 
 
 def weight_files(method: str, weights: str | Path | None = None) -> list[Path]:
-    """The files of a method's policies.
+    """The files of a method's policies, in their order.
+
+    A folder that has some of them, such as a low level of one's own, is completed by those that
+    come with the program, with a warning.
 
     Args:
         method: one of `METHODS`.
         weights: folder of the weights; see `weights_folder`.
 
     Raises:
-        InputError: one is not there.
+        InputError: one is in neither of the two.
     """
-    return [policy_path(name, weights) for name in METHODS[method]]
+    folder = Path(weights or weights_folder())
+    lent = _lent(method, folder)
+    for name in lent:
+        warnings.warn(
+            f"{folder} has no {name}.onnx: the one that comes with the program plays instead",
+            stacklevel=2,
+        )
+    return [
+        policy_path(name, bundled_weights() if name in lent else folder) for name in METHODS[method]
+    ]
+
+
+def methods_of(weights: Path) -> list[str]:
+    """The methods that a folder of weights has all policies of.
+
+    If there are none: those that it has some policies of, where the program brings the others.
+    """
+    whole = [
+        method
+        for method, policies in METHODS.items()
+        if all(_has(weights, name) for name in policies)
+    ]
+    return whole or [method for method in METHODS if _lent(method, weights)]
+
+
+def _lent(method: str, folder: Path) -> list[str]:
+    """The policies that complete a folder which has some of a method's, if they complete it."""
+    missing = [name for name in METHODS[method] if not _has(folder, name)]
+    some = len(missing) < len(METHODS[method])
+    return missing if some and all(_has(bundled_weights(), name) for name in missing) else []
+
+
+def _has(folder: Path, name: str) -> bool:
+    return (folder / f"{name}.onnx").is_file()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
-from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
@@ -13,12 +12,19 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.policies.features import Observation, action_reference
+from pianomime.policies.horizon import CHUNK, MOST_DIFFUSION_STEPS
 from pianomime.policies.sampler import Sampler, ddim_sample
+from pianomime.sealed_json import parse_json
 
 FORMAT = "pianomime policy"
 VERSION = 2
 METADATA = "pianomime"
 """Name of the ONNX metadata property that holds a `PolicyInfo` as JSON."""
+
+_MOST_NUMBERS = 1000
+"""Numbers of an action at most, of any level."""
+_NORMALIZER_RANGE = {"median": (-100.0, 100.0), "unit": (1e-6, 100.0), "limit": (0.0, 50.0)}
+"""[rad, m]; a limit has no unit. Beyond, an action would not be a finite number."""
 
 Level = Literal["high", "low", "end-to-end", "finger"]
 """From goals to fingertips; from fingertips to controls; from goals straight to controls; from one
@@ -60,6 +66,9 @@ class AsinhNormalizer:
                 raise InputError(f"normalizer.{name} must be numbers") from error
             if len(numbers) != len(self.median) or not np.isfinite(numbers).all():
                 raise InputError(f"normalizer.{name} must be {len(self.median)} finite numbers")
+            least, most = _NORMALIZER_RANGE[name]
+            if numbers and not (min(numbers) >= least and max(numbers) <= most):
+                raise InputError(f"normalizer.{name} must be {least:g} to {most:g}")
             object.__setattr__(self, name, numbers)
 
     def denormalize(self, normalized: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -89,7 +98,7 @@ class DiffusionInfo:
     normalizer: AsinhNormalizer
 
     def __post_init__(self) -> None:
-        _check_integer("diffusion.steps", self.steps, 2)
+        _check_integer("diffusion.steps", self.steps, 2, MOST_DIFFUSION_STEPS)
         _check_choice("diffusion.prediction", self.prediction, get_args(Prediction))
 
 
@@ -128,8 +137,8 @@ class PolicyInfo:
                 raise InputError(f"{field} must be text, not {getattr(self, field)!r}")
         _check_choice("level", self.level, get_args(Level))
         _check_choice("network", self.network, get_args(NetworkKind))
-        _check_integer("action_size", self.action_size, 1)
-        _check_integer("chunk", self.chunk, 1)
+        _check_integer("action_size", self.action_size, 1, _MOST_NUMBERS)
+        _check_integer("chunk", self.chunk, 1, CHUNK)
         if not isinstance(self.residual, bool):
             raise InputError(f"residual must be true or false, not {self.residual!r}")
         if self.residual and self.level == "high":
@@ -149,9 +158,9 @@ class PolicyInfo:
             InputError: it is something else, of another version, or says what cannot be.
         """
         try:
-            content = json.loads(metadata)
-        except ValueError as error:
-            raise InputError("metadata that are not JSON") from error
+            content = parse_json(metadata)
+        except InputError as error:
+            raise InputError(f"metadata: {error}") from error
         if not isinstance(content, dict) or content.pop("format", None) != FORMAT:
             raise InputError(f"not a {FORMAT}")
         version = content.pop("version", None)
@@ -240,71 +249,14 @@ class NetworkPolicy:
         return absolute
 
 
-def load_policy(path: Path, sampler: Sampler | None = None, name: str = "") -> NetworkPolicy:
-    """A policy from its ONNX file, run by ONNX Runtime.
-
-    Args:
-        path: of the file.
-        sampler: how a diffusion is sampled.
-        name: that the policy must have; any if not given.
-
-    Raises:
-        InputError: as `load_network`.
-    """
-    run, info = load_network(path, name)
-    return NetworkPolicy(run, info, sampler or Sampler())
-
-
-def load_network(path: Path, name: str = "") -> tuple[Inference, PolicyInfo]:
-    """The network of an ONNX file, and its metadata.
-
-    Args:
-        path: of the file.
-        name: that the policy must have; any if not given.
-
-    Raises:
-        InputError: there is no such file, it is damaged, of another version or of another policy,
-            or ONNX Runtime is not installed.
-    """
-    try:
-        import onnxruntime
-    except ImportError as error:
-        raise InputError(
-            "learned players need the package onnxruntime: pip install -e '.[learned]'"
-        ) from error
-    if not path.is_file():
-        raise InputError(f"{path}: does not exist")
-    options = onnxruntime.SessionOptions()
-    # Networks are small: more threads gain nothing, and wait on the cores of the physics.
-    options.intra_op_num_threads = options.inter_op_num_threads = 1
-    options.log_severity_level = 3
-    try:
-        session = onnxruntime.InferenceSession(
-            str(path), options, providers=["CPUExecutionProvider"]
-        )
-        properties = session.get_modelmeta().custom_metadata_map
-    # ONNX Runtime's errors have no class in common but this.
-    except Exception as error:
-        raise InputError(f"{path}: damaged, or not an ONNX file") from error
-    if METADATA not in properties:
-        raise InputError(f"{path}: not a policy of version {VERSION} of this program's format")
-    try:
-        info = PolicyInfo.from_metadata(properties[METADATA])
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    if name not in ("", info.name):
-        raise InputError(f"{path}: holds the policy {info.name}, not {name}")
-    return lambda inputs: session.run(None, inputs), info
-
-
-def _check_integer(name: str, value: Any, least: int) -> None:
-    if type(value) is not int or value < least:
-        raise InputError(f"{name} must be a whole number from {least} on, not {value!r}")
+def _check_integer(name: str, value: Any, least: int, most: int) -> None:
+    if type(value) is not int or not least <= value <= most:
+        raise InputError(f"{name} must be a whole number from {least} to {most}")
 
 
 def _check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise InputError(f"{name} must be one of {', '.join(choices)}, not {value!r}")
+    if not isinstance(value, str) or value not in choices:
+        raise InputError(f"{name} must be one of {', '.join(choices)}")
 
 
 def _check_fields(kind: type[Any], content: object, part: str = "") -> None:

@@ -7,7 +7,6 @@ front edge of a black key, such as "F#3 front". Front is toward the player, left
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,8 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError, UnknownNameError, closest
 from pianomime.keyboard import BLACK, KEYS, key_name
+from pianomime.schema import Field, NamedBy, check_json
+from pianomime.sealed_json import parse_json
 from pianomime.video.keyboard.geometry import FAR, FRONT, LEFT_EDGE, WHITE_WIDTH
 from pianomime.video.keyboard.plane import Plane, fit_plane_robustly
 from pianomime.world.parameters import key_centres, key_half_sizes
@@ -24,6 +25,10 @@ from pianomime.world.parameters import key_centres, key_half_sizes
 # In names that people type, a sharp is written as "#".
 _KEY_OF_NAME = {key_name(key).replace("♯", "#"): key for key in range(KEYS)}
 _NAME = re.compile(r"([A-G]#?\d) (front|back)(?: (left|right))?")
+
+_SCHEMA = {"points": NamedBy(Field("float", (2,), -1e6, 1e6))}
+"""Points by name, each a column and a row in pixels, perhaps beyond the picture."""
+_FEWEST, _MOST = 4, 1000
 
 SUGGESTED = (
     "A0 front left",
@@ -116,21 +121,16 @@ def parse_points(text: str, path: Path) -> NamedPoints:
         InputError: it does not hold at least four points, well apart.
     """
     try:
-        content = json.loads(text)
-        given = content["points"]
-        names = list(given)
-        pixels = np.array([given[name] for name in names], np.float64).reshape(-1, 2)
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        ArithmeticError,
-        RecursionError,
-    ) as error:
-        raise InputError(f'{path}: must hold {{"points": {{NAME: [COLUMN, ROW], ...}}}}') from error
-    if len(names) < 4 or not np.isfinite(pixels).all():
-        raise InputError(f"{path}: at least 4 points of two finite numbers are needed")
+        content = parse_json(text)
+        check_json(content, _SCHEMA)
+    except InputError as error:
+        raise InputError(
+            f'{path}: must hold {{"points": {{NAME: [COLUMN, ROW], ...}}}} ({error})'
+        ) from error
+    names = list(content["points"])
+    pixels = np.array(list(content["points"].values()), np.float64).reshape(-1, 2)
+    if not _FEWEST <= len(names) <= _MOST:
+        raise InputError(f"{path}: at least {_FEWEST} points of two finite numbers are needed")
     world = np.array([place_of(name) for name in names])
     try:
         plane, good = fit_plane_robustly(pixels, world)
