@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+from html import escape
 
 import av
 import numpy as np
@@ -10,9 +12,11 @@ import pytest
 
 import made_up_video as made_up
 from pianomime import cli
+from pianomime.file_names import file_name
 from pianomime.keyboard import NO_KEY
 from pianomime.music import onset_f1
 from pianomime.plan.demonstration import Demonstration
+from pianomime.shown import shown
 from pianomime.video import retarget as room
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
@@ -293,3 +297,24 @@ def test_the_real_one(shared):
         made.tracks.points[:rows, :, 1:] - reference["fingertips"][:, :, 1:, :2], axis=3
     )
     assert np.median(off[idle]) < 0.005
+
+
+def test_odd_names(video, midi, hands, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    name = os.fsdecode(b"concat:<b>$\\caf\xe9\x1b[31m")
+    odd, song = tmp_path / f"{name}.mp4", tmp_path / f"{name}.mid"
+    shutil.copyfile(video, odd)
+    shutil.copyfile(midi, song)
+    arguments = ["--midi", song.name, "--hand-model", str(hands)]
+    cli.main(["retarget", odd.name, *arguments, "--no-overlay", "--offset", str(LEAD)])
+    said = capsys.readouterr().out
+    assert "\x1b" not in said
+    stem = file_name(name)
+    written = {f"{stem}.npz", f"{stem}-seen.html"}
+    assert {file.name for file in (tmp_path / "out").iterdir()} == written
+    made = Demonstration.load(tmp_path / "out" / f"{stem}.npz")
+    assert made.source == shown(odd.name)
+    assert made.quality["notes_from"] == shown(song.name)
+    page = (tmp_path / "out" / f"{stem}-seen.html").read_text(encoding="utf-8")
+    assert f"Retargeting {escape(made.source)}" in page
+    assert "<b>" not in page
