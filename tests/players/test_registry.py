@@ -12,7 +12,7 @@ import pianomime
 from pianomime import InputError, PlannedPlayer, Score, evaluate, excerpt, load_player, songs
 from pianomime.players import player_names, register_player, registry
 from pianomime.players.registry import player_files, player_settings
-from pianomime.policies.methods import weights_folder
+from pianomime.policies.methods import bundled_weights, weights_folder
 
 PLUGIN = """
 import pianomime
@@ -123,6 +123,28 @@ def test_a_folder_of_weights_is_a_player(tmp_path: Path) -> None:
         load_player(tmp_path)
     assert load_player(tmp_path / "two-stage-diff", 0).name == "two-stage-diff"
     assert {file.parent for file in player_files(tmp_path / "two-stage-diff")} == {tmp_path}
+
+
+def test_a_level_of_ones_own_plays_with_the_bundled_other_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(weights_folder() / "low-mse.onnx", tmp_path)
+    with pytest.warns(UserWarning, match=r"has no high-diff\.onnx: the one that comes with"):
+        assert load_player(tmp_path, 0).name == "two-stage-mse"
+    with pytest.warns(UserWarning, match="high-diff"):
+        files = player_files(tmp_path)
+    assert files == [bundled_weights() / "high-diff.onnx", tmp_path / "low-mse.onnx"]
+    # A player with neither level there does not come from elsewhere.
+    monkeypatch.setenv("PIANOMIME_WEIGHTS", str(tmp_path))
+    with pytest.raises(InputError, match=r"fingers\.onnx is not there: train it"):
+        load_player("fingers", 0)
+    with pytest.raises(InputError, match=r"high-bet\.onnx is not there: train it"):
+        load_player("two-stage-bet", 0)
+    # A high level goes with more than one low level.
+    (tmp_path / "low-mse.onnx").unlink()
+    shutil.copy(bundled_weights() / "high-diff.onnx", tmp_path)
+    with pytest.raises(InputError, match=r"two-stage-diff, .*two-stage-mse"):
+        load_player(tmp_path)
 
 
 def test_a_folder_of_something_else_is_one_line(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.players.settings import PlayerFactory
-from pianomime.policies.methods import weights_folder
+from pianomime.policies.methods import bundled_weights, weights_folder
 
 
 def import_factory(place: str) -> PlayerFactory:
@@ -88,7 +88,11 @@ def plugin_files(place: str) -> list[Path]:
         file = getattr(sys.modules[name], "__file__", None)
         if file and not _is_library(Path(file)):
             files.add(Path(file))
-    return [*sorted(files), *sorted(weights_folder().glob("*.onnx"))]
+    # Ours complete a folder that has one of two levels.
+    weights = {
+        file for home in (weights_folder(), bundled_weights()) for file in home.glob("*.onnx")
+    }
+    return [*sorted(files), *sorted(weights)]
 
 
 def _reachable(module: str) -> set[str]:

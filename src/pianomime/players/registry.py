@@ -15,7 +15,7 @@ from pianomime.players.builtin import FACTORIES, SETTINGS
 from pianomime.players.player import Player
 from pianomime.players.plugin import import_factory, one_line, plugin_files
 from pianomime.players.settings import PlayerFactory, flat, settings_of
-from pianomime.policies.methods import METHODS, weight_files
+from pianomime.policies.methods import METHODS, methods_of, weight_files
 
 EFFORT = 1
 """How hard players try unless told otherwise, 0 to 3."""
@@ -167,14 +167,13 @@ def _of_folder(path: Path) -> _Found:
         # What plays experts stands above this room, and announces itself as others do.
         factory = partial(import_factory(_entry_points()[EXPERT]), run=path)
         return factory, lambda: sorted(file for file in path.iterdir() if file.is_file())
-    there = {file.stem for file in path.glob("*.onnx")}
-    whole = [method for method, policies in METHODS.items() if there.issuperset(policies)]
-    if not whole:
+    methods = methods_of(path)
+    if not methods:
         raise InputError(f"{path}: neither the folder of a run nor one of weights")
-    if len(whole) > 1:
-        known = ", ".join(f"{path / method}" for method in whole)
+    if len(methods) > 1:
+        known = ", ".join(f"{path / method}" for method in methods)
         raise InputError(f"{path}: holds weights of several players; name one: {known}")
-    return _of_weights(whole[0], path)
+    return _of_weights(methods[0], path)
 
 
 def _of_weights(method: str, weights: Path) -> _Found:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.learn.data.published import read_published
 from pianomime.learn.data.trajectories import TrajectoryData
-from pianomime.plan.demonstration import TRAIN, Demonstration
+from pianomime.plan.demonstration import TRAIN, Demonstration, is_demonstration
 from pianomime.shown import shown
 
 DEMONSTRATION_COLUMNS = ("goal", "fingertips")
@@ -92,8 +92,8 @@ def read_demonstrations(source: Path) -> list[Demonstration]:
     """Demonstrations to learn from: those of the split "train".
 
     Args:
-        source: a folder of demonstrations, as `retarget` and `import-demos` write them, or an .npz
-            file of published clips, see `read_published`.
+        source: a demonstration, as `retarget` and `import-demos` write them, a folder of such, or
+            an .npz file of published clips, see `read_published`.
 
     Raises:
         OSError: there is no such file.
@@ -101,6 +101,8 @@ def read_demonstrations(source: Path) -> list[Demonstration]:
     """
     if source.is_dir():
         found = [Demonstration.load(file) for file in sorted(source.rglob("*.npz"))]
+    elif is_demonstration(source):
+        found = [Demonstration.load(source)]
     else:
         found = [demonstration for demonstration, _ in read_published(source)]
     found = [demonstration for demonstration in found if demonstration.split == TRAIN]

@@ -10,7 +10,10 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pianomime.errors import InputError, unknown_name
-from pianomime.validation import one_of, within
+from pianomime.validation import one_of, whole_numbers, within
+
+_MOST_AHEAD = 200
+"""Frames ahead that a policy may observe, ten seconds."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,9 @@ class ObservationConfig:
     """Share of the song that has been played."""
 
     def __post_init__(self) -> None:
-        within("env.observation.goal", self.goal, 0)
-        within("env.observation.fingertips", self.fingertips, 0)
+        whole_numbers(self, "env.observation")
+        within("env.observation.goal", self.goal, 0, _MOST_AHEAD)
+        within("env.observation.fingertips", self.fingertips, 0, _MOST_AHEAD)
         if not any(vars(self).values()):
             raise InputError("env.observation: a policy needs at least one observation term")
 
@@ -53,7 +57,7 @@ class ActionConfig:
     """Let the policy work the pedal with one more action; otherwise the score's pedal is used."""
 
     def __post_init__(self) -> None:
-        within("env.action.factor", self.factor, 0)
+        within("env.action.factor", self.factor, 0, 1)
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,7 @@ class EpisodeConfig:
     """Frames after which an episode is truncated; 0 for never."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self, "env.episode")
         one_of("env.episode.start", self.start, ("beginning", "anywhere"))
         within("env.episode.frames", self.frames, 0)
 

@@ -11,7 +11,7 @@ from typing import Literal
 
 from pianomime.errors import InputError, unknown_name
 from pianomime.learn.envs.config import ENV_PRESETS, EnvConfig
-from pianomime.validation import above_zero, one_of, within
+from pianomime.validation import above_zero, one_of, whole_numbers, widths, within
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,10 @@ class PpoConfig:
     """Number of updates between evaluations."""
 
     def __post_init__(self) -> None:
-        for name in ("num_envs", "n_epochs", "evaluate_every"):
+        whole_numbers(self, "ppo")
+        for name in ("n_epochs", "evaluate_every"):
             within(f"ppo.{name}", getattr(self, name), 1)
+        within("ppo.num_envs", self.num_envs, 1, 10_000)
         for name in (
             "learning_rate",
             "learning_rate_decay",
@@ -68,8 +70,7 @@ class PpoConfig:
             within(f"ppo.{name}", getattr(self, name), 0, 1)
         for name in ("ent_coef", "vf_coef", "target_kl"):
             within(f"ppo.{name}", getattr(self, name), 0)
-        for width in self.hidden:
-            within("ppo.hidden", width, 1)
+        widths("ppo.hidden", self.hidden)
         one_of("ppo.activation", self.activation, ("gelu", "relu", "tanh"))
         steps = self.steps_per_update
         if steps < self.num_envs or steps % self.num_envs:
@@ -100,6 +101,7 @@ class TrajectorySearchConfig:
     """Sizes of the variations as factors of `PredictiveSamplingConfig`'s, one a pass, in turn."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self, "search")
         for name in ("variations", "rounds", "commit", "ahead"):
             within(f"search.{name}", getattr(self, name), 1)
         if not self.sizes:
@@ -123,6 +125,7 @@ class ExpertConfig:
     search: TrajectorySearchConfig = field(default_factory=TrajectorySearchConfig)
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         one_of("method", self.method, ("ppo", "search"))
         within("total_steps", self.total_steps, 1)
         within("seed", self.seed, 0)

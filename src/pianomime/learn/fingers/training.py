@@ -91,6 +91,7 @@ def train_fingers(
         model.threads = threads or torch.get_num_threads()
         state = folder.state()
         since = 1 if state is None else state.steps + 1
+        progress("training", (since - 1) // AGENTS, config.total_steps)
         with closing(RunLog(folder.tensorboard, since)) as log:
             callback = _Callback(folder, env, config, log, progress)
             model.set_logger(Logger(None, []))

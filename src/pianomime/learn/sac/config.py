@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pianomime.keyboard import EXCERPT_SECONDS
-from pianomime.validation import above_zero, within
+from pianomime.validation import above_zero, whole_numbers, widths, within
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class SacConfig:
     """Seed of all random numbers."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         for name in ("total_steps", "num_envs", "gradient_steps", "batch_size"):
             within(name, getattr(self, name), 1)
         within("buffer_size", self.buffer_size, self.batch_size)
@@ -41,8 +42,7 @@ class SacConfig:
             above_zero(name, getattr(self, name))
         within("gamma", self.gamma, 0, 1)
         within("seed", self.seed, 0)
-        for width in self.hidden:
-            within("hidden", width, 1)
+        widths("hidden", self.hidden)
         within("total_steps", self.total_steps, self.learning_starts + 1)
 
     @property

@@ -163,6 +163,7 @@ def train_sac(
     with RunFolder.open(out / NAME, "sac", content) as folder:
         if folder.has_result and result.exists():
             return result
+        progress("reading", 0, 0)
         songs = [GoalSong.of(load_score(path, 0.0, config.seconds)) for path in paths]
         env = SacVecEnv(songs, config, threads)
         normalizer = env.normalizer = _fit_normalizer(env, config.seed)
@@ -182,6 +183,7 @@ def train_sac(
         model.set_logger(Logger(None, []))
         state = folder.state()
         since = 1 if state is None else state.steps + 1
+        progress("training", since - 1, config.total_steps)
         with closing(RunLog(folder.tensorboard, since)) as log:
             callback = _Callback(folder, env, config, log, progress)
             callback.learn(model, config.total_steps, state, folder.path)
@@ -258,7 +260,7 @@ class _Callback(ResumableCallback):
                 getattr(buffer, name)[: len(rows)] = rows
             buffer.pos = int(arrays["buffer/next"])
             model.log_ent_coef.data.copy_(torch.from_numpy(arrays["temperature/log"]))
-        except (LookupError, ValueError, RuntimeError) as error:
+        except (LookupError, ValueError, TypeError, RuntimeError) as error:
             raise InputError(f"{path}: the checkpoint does not fit the config") from error
         buffer.full = len(rows) == buffer.buffer_size
 
