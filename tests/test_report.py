@@ -3,6 +3,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+import tracemalloc
+from collections.abc import Iterable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -17,7 +19,8 @@ from pianomime.errors import InputError
 from pianomime.evaluation.summary import summarize
 from pianomime.files import staged
 from pianomime.music import Score
-from pianomime.report import DARK, FILES, draw, write_report
+from pianomime.music.sound import Sound
+from pianomime.report import DARK, FILES, Theme, draw, write_report
 from pianomime.report.mp3 import write_mp3
 from pianomime.world.render import RenderUnavailable
 
@@ -73,6 +76,80 @@ def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) ->
     sources = Page(html).sources
     assert len(sources) == 4
     assert all(source.startswith("data:") for source in sources)
+
+
+def test_large_files_stand_beside_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pianomime.report.page.MOST_EMBEDDED", 0)
+    write_report(
+        made_up.performance(made_up.score(notes=3)), tmp_path, False, lambda *_: None, pytest.fail
+    )
+    sources = Page((tmp_path / "report.html").read_text(encoding="utf-8")).sources
+    assert sources == [
+        "performance.mp3", "score.mp3", "piano_roll_dark.png", "piano_roll.png",
+    ]  # fmt: skip
+    assert {file.name for file in tmp_path.iterdir()} == set(FILES) - {"performance.mp4"}
+    for name in ("performance.mp3", "score.mp3"):
+        with av.open(str(tmp_path / name)) as file:
+            assert sum(frame.samples for frame in file.decode(audio=0)) > 44100
+
+
+@pytest.fixture
+def cheap_sound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No synthesizer and no encoder, and sound in blocks of two seconds."""
+
+    def synthesizer(score: Score, sample_rate: int) -> np.ndarray:
+        return np.ones((round(score.pedal[-1, 1] * sample_rate), 2), np.int16)
+
+    def encoder(path: Path, blocks: Iterable[np.ndarray], sample_rate: int) -> None:
+        path.write_bytes(bytes(sum(len(block) for block in blocks) // 3))
+
+    monkeypatch.setattr("pianomime.music.sound.BLOCK_SECONDS", 2)
+    monkeypatch.setattr("pianomime.report.write.BLOCK_SECONDS", 2)
+    monkeypatch.setattr("pianomime.music.sound._synthesized", synthesizer)
+    monkeypatch.setattr("pianomime.report.write.write_mp3", encoder)
+
+
+@pytest.mark.usefixtures("cheap_sound")
+def test_the_parts_of_a_report_say_how_far_they_are(tmp_path: Path) -> None:
+    told: list[tuple[str, int, int]] = []
+
+    def progress(phase: str, done: int, total: int, remark: str = "") -> None:
+        told.append((phase, done, total))
+
+    performance = made_up.performance(made_up.score(notes=20, seconds=5.0))
+    write_report(performance, tmp_path, False, progress, pytest.fail)
+    assert list(dict.fromkeys(phase for phase, _, _ in told)) == [
+        "saving", "sound", "pictures", "page",
+    ]  # fmt: skip
+    for part in ("sound", "pictures"):
+        steps = [done for phase, done, _ in told if phase == part]
+        (total,) = {total for phase, _, total in told if phase == part}
+        assert steps == sorted(steps)
+        assert steps[0] == 0
+        assert steps[-1] == total
+    # Each block of both sounds is made twice and encoded once.
+    blocks = sum(Sound(score).block_count for score in (performance.played(), performance.score))
+    assert len([phase for phase, _, _ in told if phase == "sound"]) == 1 + 3 * blocks
+
+
+@pytest.mark.usefixtures("cheap_sound")
+def test_a_minute_more_of_music_takes_little_memory_to_report_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def picture(performance: Performance, path: Path, theme: Theme) -> None:
+        path.touch()  # of bounded size, see `test_an_hour_is_drawn_too`
+
+    monkeypatch.setattr("pianomime.report.write.draw", picture)
+    monkeypatch.setattr("pianomime.report.page.MOST_EMBEDDED", 0)
+    peaks = []
+    for minutes in (1, 3):
+        performance = made_up.performance(made_up.score(notes=50, seconds=60.0 * minutes))
+        tracemalloc.start()
+        write_report(performance, tmp_path, False, lambda *_: None, pytest.fail)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    # A minute of sound as numbers would take 23 MB.
+    assert (peaks[1] - peaks[0]) / 2 < 3e6
 
 
 def test_silence_can_be_reported(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from pianomime.palette import DARK, LIGHT
 from pianomime.players.performance import Performance
 from pianomime.progress import Progress, Steps, telling
 from pianomime.report.mp3 import write_mp3
-from pianomime.report.page import MOST_EMBEDDED, page, source
+from pianomime.report.page import page, source
 from pianomime.report.picture import draw
 from pianomime.world.render import RenderUnavailable, write_video
 from pianomime.world.scene_look import key_colours
@@ -95,8 +95,8 @@ def write_report(
         film=source("video/mp4", film) if film.exists() else None,
     )
     (folder / "report.html").write_text(html, encoding="utf-8")
-    for sound in sounds:
-        if sound.stat().st_size <= MOST_EMBEDDED:  # in the page
+    for sound, address in zip(sounds, (played_mp3, wanted_mp3), strict=True):
+        if address != sound.name:  # the page holds it
             sound.unlink()
     (folder / "report.json").write_text(
         json.dumps(row, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
