@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import text_to_path
 from numpy.typing import NDArray
 
 from pianomime.keyboard import BLACK, FRAME_RATE, KEYS, KEYS_PER_OCTAVE, LOWEST_PITCH, key_name
@@ -36,6 +37,8 @@ _FEWEST_KEYS = 3 * KEYS_PER_OCTAVE
 _FOOT = 0.2  # [inches]
 _BETWEEN = 0.2
 """[inches] between title and remark at least."""
+_POINTS = 72
+"""In an inch."""
 _MOST_LETTERS = 100
 """More letters of a title never fit."""
 
@@ -160,24 +163,30 @@ def sheet(height: float, title: str, remark: str, theme: Theme) -> Figure:
         theme: the colours.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=110, facecolor=theme.paper)
-    heading = figure.text(
-        LEFT_EDGE, 1 - 0.34 / height, title[:_MOST_LETTERS],
-        color=theme.text, fontsize=15, fontweight="bold", va="center",
+    heading, small = FontProperties(size=15, weight="bold"), FontProperties(size=10.5)
+    room = (RIGHT_EDGE - LEFT_EDGE) * WIDTH - _BETWEEN - _width(remark, small)
+    text, letters = title[:_MOST_LETTERS], min(len(title), _MOST_LETTERS)
+    while letters and _width(text, heading) > room:
+        letters -= 1
+        text = f"{title[:letters]}…"
+    figure.text(
+        LEFT_EDGE, 1 - 0.34 / height, text,
+        color=theme.text, fontproperties=heading, va="center",
         # A dollar sign in a title begins no formula.
         parse_math=False, usetex=False,
     )  # fmt: skip
-    beside = figure.text(
+    figure.text(
         RIGHT_EDGE, 1 - 0.34 / height, remark,
-        color=theme.faint_text, fontsize=10.5, va="center", ha="right",
+        color=theme.faint_text, fontproperties=small, va="center", ha="right",
     )  # fmt: skip
-    with _letters_may_lack():
-        canvas = FigureCanvasAgg(figure).get_renderer()
-        end = beside.get_window_extent(canvas).x0 - _BETWEEN * figure.dpi
-        letters = len(heading.get_text())
-        while letters and heading.get_window_extent(canvas).x1 > end:
-            letters -= 1
-            heading.set_text(f"{title[:letters]}…")
     return figure
+
+
+def _width(text: str, font: FontProperties) -> float:
+    """Width of a line of text [inches]."""
+    with _letters_may_lack():
+        points: float = text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]
+    return points / _POINTS
 
 
 def save(figure: Figure, path: str | os.PathLike[str], theme: Theme) -> None:
