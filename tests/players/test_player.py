@@ -116,6 +116,28 @@ def test_a_player_asks_for_every_frame_once_and_records_what_happened() -> None:
         np.testing.assert_array_equal(world.key_state, performance.key_state[frame])
 
 
+def test_every_part_of_planning_says_how_far_it_is() -> None:
+    """The fingering, both paths and the controls: a bar each, which ends when the part does."""
+    told: list[tuple[str, int, int]] = []
+
+    def progress(phase: str, done: int, total: int, remark: str = "") -> None:
+        told.append((phase, done, total))
+
+    load_player("zero-shot", 0).play(excerpt(two_notes(), seconds=1.0), progress)
+    parts = ["planning", "fingering", "hand paths", "controls", "playing"]
+    assert list(dict.fromkeys(phase for phase, _, _ in told)) == parts
+    for part in parts[1:]:
+        steps = [done for phase, done, _ in told if phase == part]
+        (total,) = {total for phase, _, total in told if phase == part}
+        assert steps == sorted(steps)
+        assert steps[-1] == total
+
+    # Whoever plans without being asked how far it is tells nobody.
+    before = len(told)
+    load_player("zero-shot", 0).start(excerpt(two_notes(), seconds=1.0))
+    assert len(told) == before
+
+
 def test_frames_in_which_the_physics_broke_are_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
     class Fragile(World):
         steps = 0
