@@ -176,12 +176,22 @@ def test_trim_silence() -> None:
     assert (trimmed.roll() == score.roll()[40:]).all()
 
 
-def test_pedal_is_the_state_at_the_end_of_each_frame() -> None:
+def test_pedal_of_each_frame() -> None:
     score = Score([0], [0.0], [0.5], [64], [[0.26, 0.31], [0.06, 0.14], [0.11, 0.17]])
     assert score.pedal.tolist() == [[0.06, 0.17], [0.26, 0.31]]
     assert np.flatnonzero(score.pedal_roll()).tolist() == [1, 2, 5]
     held = Score([0], [0.0], [0.5], [64], [[0.3, 0.5]])
     assert np.flatnonzero(held.pedal_roll()).tolist() == [6, 7, 8, 9, 10]
+
+
+def test_pedal_is_lifted_for_a_frame_and_pressed_for_a_frame() -> None:
+    lifted = Score([0], [0.0], [0.6], [64], [[0.0, 0.21], [0.213, 0.4]])
+    assert np.flatnonzero(~lifted.pedal_roll()).tolist() == [4, 8, 9, 10, 11, 12]
+    pressed = Score([0], [0.0], [0.6], [64], [[0.11, 0.12], [0.31, 0.33]])
+    assert np.flatnonzero(pressed.pedal_roll()).tolist() == [2, 6]
+    # Faster than there are frames: no press is late by more than a frame.
+    trill = Score([0], [0.0], [0.6], [64], [[t / 100, t / 100 + 0.005] for t in range(10, 30)])
+    assert np.flatnonzero(trill.pedal_roll()).tolist() == [2, 4]
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 60))

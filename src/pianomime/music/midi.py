@@ -1,74 +1,93 @@
 """MIDI files to and from scores.
 
-Files are parsed by symusic 0.6 or later (0.5 crashes the process on damaged files). Compared with
-mido, which pretty_midi uses, it is strict (a truncated or altered file is an error), keeps notes
-of length zero, and takes milliseconds instead of seconds. Only its ticks are used: its seconds are
-float32, while here they are float64 and computed as pretty_midi does, which decides on which side
-of a frame boundary a note falls and makes rolls equal to RoboPianist's cell for cell. One
-difference remains: where the end of a note is missing from a file, symusic drops the last note on
-that key, which pretty_midi rightly keeps (14 notes in 6 of 114 real files, 138 of 257,390 roll
-cells).
+Seconds are float64, computed in the order in which pretty_midi computes them. That decides on which
+side of a frame boundary a note falls, and makes rolls equal to RoboPianist's cell for cell.
 """
 
 from __future__ import annotations
 
+import io
 import warnings
+from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.files import atomic
 from pianomime.keyboard import KEYS, LOWEST_PITCH
+from pianomime.music.midi_channels import sounds
+from pianomime.music.midi_events import (
+    META,
+    TEMPO,
+    MidiEvent,
+    MidiEvents,
+    MidiFormatError,
+    read_events,
+)
 from pianomime.music.score import MAX_SECONDS, Score, ScoreError
 
-SUSTAIN_PEDAL = 64
-PEDAL_DOWN = 64
-"""Controller number of the sustain pedal, and the lowest value at which it is down."""
+_MOST_BYTES = 32 << 20
+"""Largest file that is read; four hours of music take less than a megabyte."""
 
-WRITTEN_TICKS_PER_BEAT = 7680
-WRITTEN_BEATS_PER_MINUTE = 120
+_MICROS_PER_BEAT = 500_000.0
+"""Tempo until the first change: the standard's 120 beats a minute."""
+
+_WRITTEN_TICKS_PER_BEAT = 7680
+_WRITTEN_BEATS_PER_MINUTE = 120
 """A frame of 0.05 s is 768 ticks, a power of two times the usual 48. So frame boundaries survive
 rounding, and rolls are read back from a file cell for cell. Ticks are also fine enough for other
 times, and coarse enough that a silence as long as the longest score fits in MIDI's 28 bits."""
+_SUSTAIN_PEDAL = 64
+_WRITTEN_CHANNELS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14, 15)
+"""All but that of drums."""
 
 
 def read_midi(path: Path) -> Score:
     """Read a MIDI file, see `Score.from_midi`."""
-    midi = _parse(path)
-    clock = _Clock(midi, path)
-    # Drums are left out; their channel has no pitches.
-    tracks = [track for track in midi.tracks if not track.is_drum]
-    notes = [track.notes.numpy() for track in tracks if len(track.notes)]
-    if not notes:
-        raise ScoreError(f"{path} has no piano notes")
-    begin = np.concatenate([each["time"] for each in notes]).astype(np.int64)
-    end = np.concatenate([_first_ends(each) for each in notes])
-    key = np.concatenate([each["pitch"] for each in notes]).astype(np.int64) - LOWEST_PITCH
-    velocity = np.concatenate([each["velocity"] for each in notes]).astype(np.int64)
-
-    on_piano = (key >= 0) & (key < KEYS)
-    left_out = int((~on_piano).sum())
-    if left_out == len(key):
-        raise ScoreError(f"{path} has no notes within the range of a piano")
-    if left_out:
-        warnings.warn(
-            f"{path}: {left_out} of {len(key)} notes are outside the range of a piano and left out",
-            stacklevel=3,
+    try:
+        file = read_events(_content(path))
+    except MidiFormatError as error:
+        raise ScoreError(f"{path} {error}") from None
+    counts = Counter(file.repairs)
+    if file.sequential:
+        counts["patterns, one after the other"] = len(file.tracks)
+    columns, pedals, start = [], [], 0.0
+    for tracks, ends in _parts(file):
+        clock = _Clock(tracks, file, counts)
+        heard = sounds(tracks, ends)
+        counts.update(heard.counts)
+        ticks = np.array(heard.notes, np.int64).reshape(-1, 4)
+        key, begin, end, velocity = _join_doubled(
+            ticks[:, 2] - LOWEST_PITCH, ticks[:, 0], ticks[:, 1], ticks[:, 3]
         )
-    key, begin, end, velocity = _join_doubled(
-        key[on_piano], begin[on_piano], end[on_piano], velocity[on_piano]
-    )
-    if begin.min() < 0 or (end < begin).any() or clock.seconds(end).max() > MAX_SECONDS:
+        columns.append((key, start + clock.seconds(begin), start + clock.seconds(end), velocity))
+        pedals.append(start + clock.seconds(np.array(heard.pedal, np.int64).reshape(-1, 2)))
+        start += float(clock.seconds(np.array(max(ends))))
+    key, onset, offset, velocity = map(np.concatenate, zip(*columns, strict=True))
+    if not len(key):
+        told = "".join(f"; {what}: {count}" for what, count in counts.items())
+        raise ScoreError(f"{path} has no piano notes{told}")
+    on_piano = (key >= 0) & (key < KEYS)
+    if not on_piano.any():
+        raise ScoreError(f"{path} has no notes within the range of a piano")
+    if offset.max() > MAX_SECONDS:
         raise ScoreError(f"{path} is damaged, or longer than {MAX_SECONDS / 3600:.0f} hours")
+    remarks = [f"{what}: {count}" for what, count in counts.items()]
+    if left_out := int((~on_piano).sum()):
+        remarks.append(
+            f"{left_out} of {len(key)} notes are outside the range of a piano and left out"
+        )
+    if remarks:
+        warnings.warn(f"{path}: {'; '.join(remarks)}", stacklevel=3)
     return Score(
-        key=key,
-        onset=clock.seconds(begin),
-        offset=clock.seconds(end),
-        velocity=velocity,
-        pedal=clock.seconds(_pedal_ticks(tracks, int(end.max()))),
+        key=key[on_piano],
+        onset=onset[on_piano],
+        offset=offset[on_piano],
+        velocity=velocity[on_piano],
+        pedal=np.concatenate(pedals),
         title=path.stem,
+        remarks=tuple(remarks),
     )
 
 
@@ -80,32 +99,90 @@ def write_midi(score: Score, path: Path) -> None:
 
 def midi_bytes(score: Score) -> bytes:
     """The bytes of a MIDI file, see `Score.to_midi`."""
-    import symusic
+    import mido
 
-    rate = WRITTEN_TICKS_PER_BEAT * WRITTEN_BEATS_PER_MINUTE / 60
-    begin = np.rint(score.onset * rate).astype(np.int32)
-    end = np.rint(score.offset * rate).astype(np.int32)
-    piano: Any = symusic.Track(name=score.title, program=0, is_drum=False)
-    piano.notes = symusic.Note.from_numpy(
-        time=begin,
-        duration=end - begin,
-        pitch=(score.key + LOWEST_PITCH).astype(np.int8),
-        velocity=score.velocity.astype(np.int8),
-    )
+    rate = _WRITTEN_TICKS_PER_BEAT * _WRITTEN_BEATS_PER_MINUTE / 60
+    begin = np.rint(score.onset * rate).astype(int).tolist()
+    end = np.rint(score.offset * rate).astype(int).tolist()
+    voice = _voices(score.key.tolist(), begin, end)
+    tracks = [mido.MidiTrack() for _ in range(max(voice, default=0) // len(_WRITTEN_CHANNELS) + 1)]
+    # (track, tick, rank at that tick, message)
+    events: list[tuple[int, int, int, mido.Message]] = []
+    for note in range(len(score)):
+        track, index = divmod(voice[note], len(_WRITTEN_CHANNELS))
+        where = {
+            "channel": _WRITTEN_CHANNELS[index],
+            "note": int(score.key[note]) + LOWEST_PITCH,
+        }
+        strike = mido.Message("note_on", velocity=int(score.velocity[note]), **where)
+        release = mido.Message("note_off", velocity=0, **where)
+        # Earlier notes end before new ones begin; a note of length zero ends after it has begun.
+        events.append((track, begin[note], 2, strike))
+        events.append((track, end[note], 3 if end[note] == begin[note] else 0, release))
     for on, off in np.rint(score.pedal * rate).astype(int).tolist():
-        piano.controls.append(symusic.ControlChange(on, SUSTAIN_PEDAL, 127))
-        piano.controls.append(symusic.ControlChange(off, SUSTAIN_PEDAL, 0))
-    midi: Any = symusic.Score(WRITTEN_TICKS_PER_BEAT)
-    midi.tempos.append(symusic.Tempo(0, WRITTEN_BEATS_PER_MINUTE))
-    midi.tracks.append(piano)
-    content: bytes = midi.dumps_midi()
-    return content
+        for channel in _WRITTEN_CHANNELS[: min(max(voice, default=0) + 1, len(_WRITTEN_CHANNELS))]:
+            pedal = {"channel": channel, "control": _SUSTAIN_PEDAL}
+            events.append((0, on, 1, mido.Message("control_change", value=127, **pedal)))
+            events.append((0, off, 1, mido.Message("control_change", value=0, **pedal)))
+    events.sort(key=lambda event: event[:3])
+    # Half of a character cannot be written: it stands for a byte of a file's name.
+    name = score.title.encode("utf-8", "replace").decode("utf-8")
+    tempo = mido.bpm2tempo(_WRITTEN_BEATS_PER_MINUTE)
+    tracks[0].append(mido.MetaMessage("track_name", name=name))
+    tracks[0].append(mido.MetaMessage("set_tempo", tempo=tempo))
+    now = [0] * len(tracks)
+    for track, tick, _, message in events:
+        message.time = tick - now[track]
+        now[track] = tick
+        tracks[track].append(message)
+    file = mido.MidiFile(
+        type=min(len(tracks) - 1, 1),
+        ticks_per_beat=_WRITTEN_TICKS_PER_BEAT,
+        charset="utf-8",
+        tracks=tracks,
+    )
+    content = io.BytesIO()
+    file.save(file=content)
+    return content.getvalue()
 
 
-def _parse(path: Path) -> Any:
-    """The file as a `symusic.Score` in ticks."""
+def _voices(key: list[int], begin: list[int], end: list[int]) -> list[int]:
+    """A number for each note such that notes of one number and key do not overlap.
+
+    Notes are sorted by beginning. In a file they get a channel each: on one channel, the end of
+    the first of two notes would end both.
+    """
+    # The last note of each voice of a key.
+    last: dict[int, list[int]] = {}
+    voice = []
+    for note in range(len(key)):
+        voices = last.setdefault(key[note], [])
+        free = next(
+            (
+                index
+                for index, other in enumerate(voices)
+                if end[other] <= begin[note] and begin[other] < begin[note]
+            ),
+            len(voices),
+        )
+        voices[free : free + 1] = [note]
+        voice.append(free)
+    return voice
+
+
+def _parts(file: MidiEvents) -> list[tuple[list[list[MidiEvent]], list[int]]]:
+    """Tracks that sound together, with their ends; patterns follow one another."""
+    if not file.sequential:
+        return [(file.tracks, file.ends)]
+    return [([track], [end]) for track, end in zip(file.tracks, file.ends, strict=True)]
+
+
+def _content(path: Path) -> bytes:
+    """All bytes of the file."""
     try:
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            # Not its size, which a device does not tell.
+            content = file.read(_MOST_BYTES + 1)
     except FileNotFoundError:
         raise ScoreError(f"{path} does not exist") from None
     except IsADirectoryError:
@@ -114,38 +191,44 @@ def _parse(path: Path) -> Any:
         raise ScoreError(f"{path} cannot be read: {error.strerror}") from error
     if not content:
         raise ScoreError(f"{path} is empty")
-    if not content.startswith(b"MThd"):
-        raise ScoreError(f"{path} is not a MIDI file")
-    if len(content) >= 14 and content[12] >= 0x80:
-        raise ScoreError(f"{path} is timed by SMPTE codes; only beats are supported")
-
-    import symusic
-
-    try:
-        midi: Any = symusic.Score.from_midi(content)
-    except (RuntimeError, ValueError) as error:
-        raise ScoreError(f"{path} is a damaged or incomplete MIDI file") from error
-    if midi.ticks_per_quarter < 1:
-        raise ScoreError(f"{path} is damaged: it has no ticks in a beat")
-    return midi
+    if len(content) > _MOST_BYTES:
+        raise ScoreError(f"{path} is larger than {_MOST_BYTES >> 20} MiB, so it is not music")
+    return content
 
 
 class _Clock:
-    """Converts ticks to seconds with the tempo changes of one file."""
+    """Converts ticks to seconds with the tempo changes of tracks that sound together.
 
-    def __init__(self, midi: Any, path: Path) -> None:
-        changes = midi.tempos.numpy()
-        tick = changes["time"].astype(np.int64)
-        micros_per_beat = changes["mspq"].astype(np.float64)
-        if (micros_per_beat <= 0).any():
-            raise ScoreError(f"{path} is damaged: it has a tempo of zero")
-        # The MIDI standard's default is 120 beats per minute.
-        tick = np.append(0, tick)
-        micros_per_beat = np.append(500_000.0, micros_per_beat)
+    Args:
+        tracks: events of each track.
+        file: the file, which may fix the length of a tick.
+        counts: tempos that cannot be are counted here.
+    """
+
+    def __init__(
+        self, tracks: list[list[MidiEvent]], file: MidiEvents, counts: Counter[str]
+    ) -> None:
+        changes = [
+            (event.tick, int.from_bytes(event.data[1:4], "big"))
+            for track in tracks
+            for event in track
+            if event.status == META and event.data[0] == TEMPO
+        ]
+        changes.sort(key=lambda change: change[0])
+        possible = [(0, _MICROS_PER_BEAT), *(change for change in changes if change[1])]
+        if impossible := len(changes) + 1 - len(possible):
+            counts["tempos of zero, ignored"] += impossible
+        if file.ticks_per_beat is None:
+            possible = possible[:1]
+        tick, micros_per_beat = zip(*possible, strict=True)
+        self.tick = np.array(tick, np.int64)
         # In the order in which pretty_midi computes it: see the top of this file.
-        self.tick_seconds = 60.0 / ((6e7 / micros_per_beat) * midi.ticks_per_quarter)
-        self.tick = tick
-        self.second = np.append(0.0, np.cumsum(np.diff(tick) * self.tick_seconds[:-1]))
+        self.tick_seconds = (
+            np.array([file.tick_seconds])
+            if file.ticks_per_beat is None
+            else 60.0 / ((6e7 / np.array(micros_per_beat, np.float64)) * file.ticks_per_beat)
+        )
+        self.second = np.append(0.0, np.cumsum(np.diff(self.tick) * self.tick_seconds[:-1]))
 
     def seconds(self, tick: NDArray[np.int64]) -> NDArray[np.float64]:
         """Seconds at each tick, any shape."""
@@ -153,26 +236,6 @@ class _Clock:
         return np.asarray(
             self.second[tempo] + (tick - self.tick[tempo]) * self.tick_seconds[tempo], np.float64
         )
-
-
-def _first_ends(notes: dict[str, NDArray[Any]]) -> NDArray[np.int64]:
-    """(N,) Tick at which each note of a track ends: the first end on its key after its beginning.
-
-    symusic pairs the first beginning on a key with the first end, the second with the second, so
-    that after one missing end every later note on the key would last too long. In pretty_midi, and
-    therefore in RoboPianist, an end ends all notes on the key.
-    """
-    begin = notes["time"].astype(np.int64)
-    end: NDArray[np.int64] = begin + notes["duration"]
-    # All keys share one axis, far enough apart that a search cannot reach the next key.
-    start_of_key = notes["pitch"].astype(np.int64) * (end.max() + 1)
-    ends = np.sort(start_of_key + end)
-    first: NDArray[np.int64] = ends[
-        np.searchsorted(ends, start_of_key + begin, side="right") % len(ends)
-    ]
-    # A note of length zero stays so.
-    first = np.where(end > begin, first - start_of_key, end)
-    return first
 
 
 def _join_doubled(
@@ -185,27 +248,10 @@ def _join_doubled(
     order = np.lexsort((key, begin))
     key, begin, end, velocity = key[order], begin[order], end[order], velocity[order]
     first = np.flatnonzero(np.append(True, (np.diff(key) != 0) | (np.diff(begin) != 0)))
+    first = first[: len(key)]
     return (
         key[first],
         begin[first],
-        np.maximum.reduceat(end, first),
-        np.maximum.reduceat(velocity, first),
+        np.maximum.reduceat(end, first) if len(first) else end,
+        np.maximum.reduceat(velocity, first) if len(first) else velocity,
     )
-
-
-def _pedal_ticks(tracks: list[Any], last_tick: int) -> NDArray[np.int64]:
-    """(P, 2) Ticks at which the sustain pedal goes down and up, whichever track moves it."""
-    controls = [track.controls.numpy() for track in tracks if len(track.controls)]
-    if not controls:
-        return np.zeros((0, 2), np.int64)
-    tick = np.concatenate([each["time"] for each in controls]).astype(np.int64)
-    number = np.concatenate([each["number"] for each in controls])
-    down = np.concatenate([each["value"] for each in controls]) >= PEDAL_DOWN
-    tick, down = tick[number == SUSTAIN_PEDAL], down[number == SUSTAIN_PEDAL]
-    order = np.argsort(tick, kind="stable")
-    tick, down = tick[order], down[order]
-    moves = np.flatnonzero(np.diff(np.append(False, down)))
-    # A pedal that never comes up is held until the last note ends.
-    end = np.append(tick[moves], last_tick)
-    pedal: NDArray[np.int64] = end[: len(end) // 2 * 2].reshape(-1, 2)
-    return np.maximum(pedal, pedal[:, :1])

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.shown import shown
 
 MAX_SECONDS = 4 * 3600.0
 """[s] Longest score. A damaged MIDI file can last years, and its roll would not fit in memory."""
@@ -35,6 +36,7 @@ class Score:
         pedal: (P, 2) float64 [s], intervals [on, off) with the sustain pedal down, in order and
             apart from each other.
         title: name of the piece.
+        remarks: what was mended or left out when its file was read, with counts.
 
     Raises:
         ScoreError: shapes do not match, or keys, velocities or times are out of range.
@@ -46,6 +48,7 @@ class Score:
     velocity: NDArray[np.int64]
     pedal: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     title: str = ""
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         key = np.array(self.key, np.int64)
@@ -74,30 +77,32 @@ class Score:
         ):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        object.__setattr__(self, "title", shown(self.title))
 
     @classmethod
     def from_midi(cls, path: str | os.PathLike[str]) -> Score:
         """Read a MIDI file: all tracks except drums, tempo changes, sustain pedal (CC64 >= 64).
 
-        Notes outside the range of a piano (MIDI pitch 21..108) are left out with one warning. Notes
-        of two tracks that strike one key at the same instant become one. The title is the file's
-        name without suffix.
+        Files that are damaged are read as far as it can be told what was meant. Notes outside the
+        range of a piano (MIDI pitch 21..108) are left out. What was mended or left out is told in
+        one warning, with counts, and stands in `remarks`. Notes of two tracks that strike one key
+        at the same instant become one. The title is the file's name without suffix.
 
         Args:
-            path: the file.
+            path: the file; a RIFF wrapper (.rmi) is taken off.
 
         Raises:
-            ScoreError: the file does not exist, is not a MIDI file, is damaged, or has no piano
-                notes.
+            ScoreError: the file does not exist, is not a MIDI file, or has no piano notes.
         """
         from pianomime.music.midi import read_midi
 
         return read_midi(Path(path))
 
     def to_midi(self, path: str | os.PathLike[str]) -> None:
-        """Write a MIDI file with one piano track; times are rounded to 1/15360 s.
+        """Write a MIDI file; times are rounded to 1/15360 s.
 
-        Times that are multiples of 0.05 s, and therefore rolls, are read back unchanged.
+        Times that are multiples of 0.05 s, and therefore rolls, are read back unchanged. Notes that
+        overlap on one key are on channels of their own, for an end would end all of a channel.
 
         Args:
             path: the file; it is written in one step.
@@ -256,9 +261,12 @@ class Score:
         return down
 
     def pedal_roll(self, dt: float = FRAME_SECONDS) -> NDArray[np.bool_]:
-        """Whether the sustain pedal is down at the end of each frame.
+        """Whether the sustain pedal is down in each frame.
 
-        A pedal that is down when the last note ends stays down until the last frame.
+        It goes down in frame floor(on / dt) and comes up in frame floor(off / dt), but stays up for
+        at least one frame between two presses, and down for at least one in each, as far as there
+        are frames enough: a lift of a few milliseconds damps the strings too. A pedal that is down
+        when the last note ends stays down until the last frame.
 
         Args:
             dt: length of a frame [s].
@@ -269,8 +277,14 @@ class Score:
         spans = np.floor(self.pedal * _rate(dt)).astype(np.int64)
         down = np.zeros(self.frames(dt), bool)
         spans[self.pedal[:, 1] >= self.duration, 1] = len(down)
+        free = 0
+        # Each press depends on the one before it.
         for first, stop in spans.tolist():
-            down[first:stop] = True
+            begin = max(first, free)
+            if begin <= max(first, stop):
+                end = max(stop, begin + 1)
+                down[begin:end] = True
+                free = end + 1
         return down
 
 

@@ -1,9 +1,7 @@
 """Sound of a score, a minute at a time: a sampled piano if there is one, else additive synthesis.
 
 The samples are those of the soundfont in pretty_midi's wheel, the synthesizer is midirenderer's:
-both come with `pip install`, without a system library. (symusic, which reads the MIDI files, has a
-synthesizer too; that of 0.6 cannot return its sound to Python, that of 0.5 ignores pedal and
-velocity.)
+both come with `pip install`, without a system library.
 """
 
 from __future__ import annotations
