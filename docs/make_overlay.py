@@ -47,7 +47,10 @@ def main() -> None:
         performance.played().to_midi(midi)
         model.touch()
         given = rendered_video.hands(performance)
-        with patch.object(room, "HandDetector", lambda _: given):
+        with (
+            patch.object(room, "check_mediapipe"),
+            patch.object(room, "HandDetector", lambda _: given),
+        ):
             made = retarget(film, RetargetConfig(midi=midi, hand_model=model))
         write_overlay(made, overlay)
         pressing = (made.demonstration.plan.finger_key >= 0).any(axis=2).sum(axis=1)

@@ -15,7 +15,7 @@ SOURCE = ROOT / "src" / "pianomime"
 ROOMS = (
     ("errors", "installation", "keyboard", "palette", "progress", "shown", "stop"),
     ("file_names", "staging", "schema", "seal"),
-    ("files", "archive", "local_server", "sealed_json", "validation", "web_page", "workers"),
+    ("files", "archive", "local_server", "mp4", "sealed_json", "validation", "web_page", "workers"),
     ("music",),
     ("songs",),
     ("world",),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from fractions import Fraction
 from html import escape
 
 import av
@@ -12,6 +13,7 @@ import pytest
 
 import made_up_video as made_up
 from pianomime import cli
+from pianomime.errors import InputError
 from pianomime.file_names import file_name
 from pianomime.keyboard import NO_KEY
 from pianomime.music import onset_f1
@@ -20,6 +22,8 @@ from pianomime.shown import shown
 from pianomime.video import retarget as room
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
+from pianomime.video.hands import detector
+from pianomime.video.overlay import write_overlay
 from pianomime.video.remarks import on_keyboard
 from pianomime.video.retarget import RetargetConfig, retarget
 
@@ -56,6 +60,8 @@ def hands(monkeypatch, plane, plan, tmp_path):
     monkeypatch.setattr(
         room, "HandDetector", lambda _: made_up.TrueHands(plane, SIZE, plan.fingertips[..., :2])
     )
+    for place in (room, detector):
+        monkeypatch.setattr(place, "check_mediapipe", lambda: None)
     model = tmp_path / "hand.task"
     model.write_bytes(b"stands in")
     return model
@@ -188,6 +194,56 @@ def test_one_hand_is_enough(video, midi, hands, plane, plan, monkeypatch):
     assert (made.fingers.hand[made.demonstration.score.key > 36] == 1).all()
 
 
+def test_mediapipe_is_missed_first(tmp_path, monkeypatch, capsys):
+    """Before any file is read, and before the hand model is downloaded."""
+    monkeypatch.setattr(detector, "find_spec", lambda _: None)
+    monkeypatch.setattr(room, "find_hand_model", lambda _: pytest.fail("looked for the model"))
+    with pytest.raises(InputError, match="MediaPipe"):
+        retarget(tmp_path / "nothing.mp4")
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["retarget", str(tmp_path / "nothing.mp4")])
+    assert stopped.value.code == 2
+    printed = capsys.readouterr().err.strip()
+    assert "install" in printed
+    assert "[video]" in printed
+    assert "\n" not in printed
+
+
+def with_sound(video, path, delay, seconds=3.0):
+    """A copy of a video with a tone that begins at its second second, in a file that is late."""
+    rate = 44_100
+    with av.open(str(video)) as old, av.open(str(path), "w") as new:
+        pictures = new.add_stream_from_template(old.streams.video[0])
+        sound = new.add_stream("aac", rate=rate, layout="mono")
+        for packet in old.demux(old.streams.video[0]):
+            if packet.dts is not None:
+                packet.stream = pictures
+                late = round(delay / packet.time_base)
+                packet.pts, packet.dts = packet.pts + late, packet.dts + late
+                new.mux(packet)
+        times = np.arange(round((delay + seconds) * rate)) / rate - delay
+        tone = (0.5 * np.sin(2 * np.pi * 440 * times) * (times >= 2)).astype(np.float32)
+        frame = av.AudioFrame.from_ndarray(tone[None], format="fltp", layout="mono")
+        frame.sample_rate, frame.pts, frame.time_base = rate, 0, Fraction(1, rate)
+        new.mux(sound.encode(frame))
+        new.mux(sound.encode(None))
+    return path
+
+
+def test_the_film_of_what_was_seen_sounds_like_the_video(video, midi, hands, tmp_path):
+    loud = with_sound(video, tmp_path / "loud.mp4", delay=0.7)
+    made = retarget(loud, RetargetConfig(midi=midi, hand_model=hands))
+    write_overlay(made, tmp_path / "seen.mp4")
+    with av.open(str(tmp_path / "seen.mp4")) as film:
+        pictures, sound = film.streams.video[0], film.streams.audio[0]
+        length = float(pictures.duration * pictures.time_base)
+        assert float(sound.duration * sound.time_base) == pytest.approx(length, abs=0.05)
+        rate = sound.rate
+        heard = np.concatenate([frame.to_ndarray()[0] for frame in film.decode(sound)])
+    loudness = np.abs(heard[: round(length) * rate].reshape(-1, rate // 20)).max(axis=1)
+    assert np.flatnonzero(loudness > 0.1)[[0, -1]] / 20 == pytest.approx([2.0, 2.95], abs=0.06)
+
+
 def test_an_interruption_leaves_nothing(video, midi, hands, tmp_path, monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
@@ -248,6 +304,8 @@ def test_the_command_writes_all_or_nothing(video, midi, hands, tmp_path, capsys)
     assert Demonstration.load(out).quality["notes_from"] == midi.name
     overlay = Film(tmp_path / "new" / "demo-seen.mp4")
     assert (overlay.width, overlay.height) == SIZE
+    with av.open(str(overlay.path)) as film:
+        assert not film.streams.audio  # nor has the video
     assert "Where tracking was poor" in (tmp_path / "new" / "demo-seen.html").read_text("utf-8")
     cli.main(["play", str(out), "--no-video", "--seconds", "1", "-o", str(tmp_path / "played")])
     assert (tmp_path / "played" / "report.json").exists()

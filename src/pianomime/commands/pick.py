@@ -39,11 +39,14 @@ class Pick:
         """
         import webbrowser
 
+        from pianomime.commands.extras import extra
         from pianomime.errors import InputError
         from pianomime.file_names import file_name
         from pianomime.shown import command_word, shown
         from pianomime.video.film.film import Film
-        from pianomime.video.keyboard.pick_page import PickPage
+
+        with extra("video"):
+            from pianomime.video.keyboard.pick_page import PickPage
 
         out = self.out or Path("out", file_name(self.video.stem) + "-points.json")
         if out.suffix != ".json":
@@ -55,6 +58,4 @@ class Pick:
                 webbrowser.open(page.url)
             saved = page.wait()
         print(f"saved {shown(out)}: {shown(saved)}")
-        print(
-            f"next: pianomime retarget {command_word(self.video)} --points {command_word(out)}"
-        )
+        print(f"next: pianomime retarget {command_word(self.video)} --points {command_word(out)}")

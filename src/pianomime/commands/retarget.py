@@ -50,14 +50,20 @@ class Retarget:
             InputError: no demonstration can be made from these files.
             OSError: a file cannot be read or written.
         """
+        from pianomime.video.hands.detector import check_mediapipe
+
+        # Before the other imports, which take seconds.
+        check_mediapipe()
         from pianomime.commands.progress import bars
         from pianomime.errors import InputError
+        from pianomime.file_names import file_name
         from pianomime.files import staged
+        from pianomime.shown import command_word, shown
         from pianomime.video.overlay import write_overlay
         from pianomime.video.retarget import RetargetConfig, retarget
         from pianomime.video.summary import write_summary
 
-        out = self.out or Path("out", self.video.stem + ".npz")
+        out = self.out or Path("out", file_name(self.video.stem) + ".npz")
         if out.suffix != ".npz":
             raise InputError(f"{out}: the name of a demonstration must end in .npz")
         if out.exists() and out.is_dir():
@@ -70,7 +76,7 @@ class Retarget:
         config = RetargetConfig(self.midi, self.points, self.offset, self.hand_model, self.align)
         # The folder first: if it cannot be written, this fails before the work, not after. All
         # files appear together, so that an interruption leaves no page without its demonstration.
-        with staged(out.parent, ours) as folder, bars() as progress:
+        with staged(out.parent, ours, out.name) as folder, bars() as progress:
             made = retarget(self.video, config, progress)
             if self.overlay:
                 write_overlay(made, folder / overlay.name, progress)
@@ -81,8 +87,8 @@ class Retarget:
         print(f"both hands seen in {quality['both_hands_found']:.1%} of the frames")
         print(f"notes: {quality['notes']}, fingers guessed: {quality['notes_guessed']}")
         for remark in made.remarks[:_REMARKS]:
-            print(f"note: {remark}")
+            print(f"note: {shown(remark)}")
         if len(made.remarks) > _REMARKS:
             print(f"note: {len(made.remarks) - _REMARKS} more such notes are on the page")
-        print(f"page: {page}")
-        print(f"next: pianomime play {out}")
+        print(f"page: {shown(page)}")
+        print(f"next: pianomime play {command_word(out)}")

@@ -7,14 +7,15 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from pianomime.keyboard import BLACK, KEYS, NO_KEY
+from pianomime.palette import DARK, rgb
 from pianomime.plan import LEFT
 from pianomime.video.keyboard.geometry import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
 from pianomime.video.keyboard.plane import Plane
 from pianomime.world.parameters import key_centres, key_half_sizes
 
-HAND_COLOURS = ((255, 176, 0), (0, 200, 255))
-"""Colours (red, green, blue) of the left and the right hand, 0..255."""
-_LOST = (255, 60, 60)
+# Bright, because they are seen on pictures that are dark in many places.
+_HANDS = tuple(rgb(colour) for colour in DARK.hands[:2])
+_LOST = rgb(DARK.wrong)
 """Colour of hands that were not seen."""
 _GRID = (90, 255, 120)
 """Colour of the outlines of the keys."""
@@ -52,7 +53,7 @@ class Drawing:
         Args:
             picture: (height, width, 3) uint8; it is not changed.
             points: (2, 6, 2) world x, y of both hands' points [m].
-            found: (2,) bool, hands that were seen; the others are drawn in red.
+            found: (2,) bool, hands that were seen; the others are drawn in another colour.
             finger_key: (2, 5) key that each finger presses, -1 for none.
 
         Returns:
@@ -64,7 +65,7 @@ class Drawing:
             pen.polygon(_corners(outline), outline=(*_GRID, 90))
         places = self._plane.to_pixels(points)
         radius = max(3.0, picture.shape[1] / 320)
-        for hand, colour in enumerate(HAND_COLOURS):
+        for hand, colour in enumerate(_HANDS):
             for finger, key in enumerate(finger_key[hand]):
                 if key != NO_KEY:
                     outline = self._outlines[key]

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
+from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
-from typing import Any
 
-import av
 import numpy as np
 
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, NO_KEY
+from pianomime.mp4 import Mp4
+from pianomime.music.sound import SAMPLE_RATE
 from pianomime.progress import Progress, no_progress
 from pianomime.video.drawing import Drawing
+from pianomime.video.film.sound import film_sound
 from pianomime.video.retarget import Retargeted
 from pianomime.world.layout import FINGER_COUNT
 
+_CRF = 26
+"""Quality of the pictures: what a person has filmed need not be kept better than that."""
+
 
 def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress) -> None:
-    """Write the video at 20 pictures per second, without sound.
+    """Write the video at 20 pictures per second, with its sound if it has some.
 
     Args:
         made: the retargeted video.
@@ -29,14 +34,10 @@ def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress
     finger_key = made.demonstration.plan.finger_key
     nothing = np.full((2, FINGER_COUNT), NO_KEY, np.int8)
     tracks = made.tracks
-    with (
-        atomic(path) as temporary,
-        av.open(str(temporary), "w", format="mp4", options={"movflags": "+faststart"}) as film,
-    ):
-        stream: Any = None
-        for number, frame in enumerate(made.film.frames(FRAME_RATE)):
-            if number >= len(tracks):
-                break
+    frames = islice(made.film.frames(FRAME_RATE), len(tracks))
+    with atomic(path) as temporary, film_sound(made.film) as sound, ExitStack() as stack:
+        film: Mp4 | None = None
+        for number, frame in enumerate(frames):
             drawn = drawing.draw(
                 frame.picture,
                 tracks.points[number],
@@ -44,14 +45,10 @@ def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress
                 finger_key[number] if number < len(finger_key) else nothing,
             )
             # H.264 needs an even size.
-            drawn = drawn[: drawn.shape[0] // 2 * 2, : drawn.shape[1] // 2 * 2]
-            if stream is None:
-                stream = film.add_stream("libx264", rate=round(FRAME_RATE))
-                stream.height, stream.width = drawn.shape[:2]
-                stream.pix_fmt = "yuv420p"
-                stream.options = {"crf": "26", "preset": "superfast"}
-            picture = av.VideoFrame.from_ndarray(np.ascontiguousarray(drawn), format="rgb24")
-            picture.pts, picture.time_base = number, Fraction(1, round(FRAME_RATE))
-            film.mux(stream.encode(picture))
+            height, width = (side // 2 * 2 for side in drawn.shape[:2])
+            if film is None:
+                rate = None if sound is None else SAMPLE_RATE
+                film = stack.enter_context(Mp4(temporary, (width, height), rate, _CRF))
+            begin, end = film.span
+            film.add(drawn[:height, :width], None if sound is None else sound(end - begin))
             progress("overlay", number + 1, len(tracks))
-        film.mux(stream.encode(None))

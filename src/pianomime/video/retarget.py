@@ -18,11 +18,12 @@ from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import LEFT, RIGHT
 from pianomime.plan.demonstration import Demonstration, on_grid
 from pianomime.progress import Progress, no_progress
+from pianomime.shown import shown, title_of
 from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
-from pianomime.video.hands.detector import HandDetector
+from pianomime.video.hands.detector import HandDetector, check_mediapipe
 from pianomime.video.hands.model import find_hand_model
 from pianomime.video.hands.sightings import Sightings
 from pianomime.video.hands.tracks import HandTracks, follow
@@ -125,7 +126,7 @@ def retarget(
         "remarks": remarks,
     }
     homography = seen.view.plane.zoomed(given.film.zoom).matrix
-    demonstration = Demonstration(timed.score, plan, video.name, homography, quality)
+    demonstration = Demonstration(timed.score, plan, shown(video.name), homography, quality)
     return Retargeted(demonstration, given.film, seen.view.plane, seen.tracks, fingers, remarks)
 
 
@@ -144,6 +145,8 @@ class _Given:
         """Everything that can be wrong with the files is found here, before the long work."""
         if config.offset is not None and not abs(config.offset) <= MAX_SECONDS:
             raise InputError(f"--offset must be a time in the video, not {config.offset:g} s")
+        # Before anything is read, and long before the hand model is downloaded for it.
+        check_mediapipe()
         points = None if config.points is None else read_points(config.points)
         score = None if config.midi is None else Score.from_midi(config.midi)
         film = Film(video)
@@ -283,7 +286,7 @@ def _best_view(
 
 def _read_score(film: Film, tracks: HandTracks, light: LightRecord) -> _Timed:
     """The score read from the video itself."""
-    read = read_notes(light, tracks, film.path.stem)
+    read = read_notes(light, tracks, title_of(film.path))
     if not len(read.score):
         raise InputError(
             f"{film.path}: no keys are seen going down or lighting up; give what is played with "
@@ -327,7 +330,7 @@ def _place_midi(given: _Given, score: Score, offset: Offset, seconds: float) -> 
             cut, onset=cut.onset - begin, offset=cut.offset - begin, pedal=cut.pedal - begin
         )
     facts = {
-        "notes_from": "" if midi is None else midi.name,
+        "notes_from": "" if midi is None else shown(midi.name),
         "offset_seconds": round(offset.seconds, 4),
         "notes_touched": round(offset.touched, 4),
         "notes_touched_by_chance": round(offset.by_chance, 4),

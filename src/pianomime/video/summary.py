@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 from html import escape
 from pathlib import Path
@@ -13,31 +12,38 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
+from pianomime import __version__
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE
+from pianomime.palette import DARK, LIGHT, Theme
 from pianomime.plan import LEFT, RIGHT
-from pianomime.video.drawing import HAND_COLOURS, Drawing
+from pianomime.video.drawing import Drawing
 from pianomime.video.retarget import Retargeted
+from pianomime.web_page import data_url, web_page
 
 _PICTURES = 3
 _MOST_POINTS = 20_000
 """Most points of a plotted line; the picture has some thousand columns."""
 
-_PAGE = Template("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>$title</title>
-<meta name="viewport" content="width=device-width, initial-scale=1"><style>
-:root { color-scheme: light dark; font-family: system-ui, sans-serif; }
-body { max-width: 72rem; margin: 2rem auto; padding: 0 1rem; line-height: 1.5; }
-img { width: 100%; } table { border-collapse: collapse; }
-td { padding: .2rem 1rem .2rem 0; vertical-align: top; } li { margin: .2rem 0; }
-</style></head><body><h1>$title</h1>
-<h2>Remarks</h2>$remarks
-<h2>Where tracking was poor</h2>
-<p>Red: the hand was not seen, and its position is interpolated. Below: the distance of each note's
-finger from its key at the onset.</p>
-<img alt="tracking over time" src="$timeline">
-<h2>Frames of the video</h2>$pictures
-<h2>Quality</h2><table>$quality</table></body></html>
+_STYLE = """\
+img + img { margin-top: 1rem; }
+td:nth-child(2) { text-align: left; }
+li { margin: .2rem 0; }
+"""
+_BODY = Template("""\
+<h1>$title</h1>
+<p class="under">How well hands, keys and notes were seen</p>
+<section><h2>Remarks</h2>$remarks</section>
+<section><h2>Where tracking was poor</h2>
+<picture>
+<source media="(prefers-color-scheme: dark)" srcset="$dark_timeline">
+<img alt="Position of both hands and misfit of every note over time" src="$timeline">
+</picture>
+<p>Dots on the lines: the hand was not seen, and its position is interpolated. Below: the distance
+of each note's finger from its key at the onset; above the line it is too far.</p></section>
+<section><h2>Frames of the video</h2>$pictures</section>
+<section><h2>Quality</h2><table>$quality</table></section>
+<footer>Made by PianoMime $version.</footer>
 """)
 
 
@@ -49,12 +55,15 @@ def write_summary(made: Retargeted, path: Path) -> None:
         path: self-contained HTML file; it appears only when complete.
     """
     remarks = "".join(f"<li>{escape(remark)}</li>" for remark in made.remarks)
-    page = _PAGE.substitute(
-        title=escape(f"Retargeting {made.demonstration.source}"),
+    title = f"Retargeting {made.demonstration.source}"
+    body = _BODY.substitute(
+        title=escape(title),
         remarks=f"<ul>{remarks}</ul>" if remarks else "<p>None.</p>",
-        timeline=_data(_timeline(made)),
+        timeline=data_url("image/png", _timeline(made, LIGHT)),
+        dark_timeline=data_url("image/png", _timeline(made, DARK)),
+        version=escape(__version__),
         pictures="".join(
-            f'<p><img alt="keys and hands" src="{_data(_png(picture))}"></p>'
+            f'<img alt="keys and hands" src="{data_url("image/png", _png(picture))}">'
             for picture in _pictures(made)
         ),
         quality="".join(
@@ -64,29 +73,40 @@ def write_summary(made: Retargeted, path: Path) -> None:
         ),
     )
     with atomic(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(web_page(f"{title} - PianoMime", body, _STYLE), encoding="utf-8")
 
 
-def _timeline(made: Retargeted) -> bytes:
+def _timeline(made: Retargeted, theme: Theme) -> bytes:
     """PNG of both hands and of the misfit of every note over time."""
     tracks, score, fingers = made.tracks, made.demonstration.score, made.fingers
-    figure = Figure(figsize=(12, 4.5), layout="constrained")
+    figure = Figure(figsize=(12, 4.5), layout="constrained", facecolor=theme.paper)
     hands, notes = figure.subplots(2, 1, sharex=True)
     seconds = np.arange(len(tracks)) / FRAME_RATE
     some = slice(None, None, max(1, len(tracks) // _MOST_POINTS))
-    for hand, name in ((LEFT, "left"), (RIGHT, "right")):
-        colour = np.array(HAND_COLOURS[hand]) / 255
+    for hand, name in ((LEFT, "left hand"), (RIGHT, "right hand")):
+        colour = theme.hands[hand]
         middle = tracks.points[:, hand, 1:, 1].mean(axis=1)
         hands.plot(seconds[some], middle[some], color=colour, label=name)
         lost = ~tracks.found[:, hand]
-        hands.scatter(seconds[lost], middle[lost], color="red", s=8, zorder=3)
+        label = None if hand == LEFT else "not seen"
+        hands.scatter(seconds[lost], middle[lost], color=theme.wrong, s=8, zorder=3, label=label)
         mine = fingers.hand == hand
         notes.scatter(score.onset[mine], np.sqrt(fingers.misfit[mine]), color=colour, s=10)
     hands.set_ylabel("hand along keyboard [m]")
-    hands.legend(loc="upper right")
-    notes.axhline(3.0, color="red", linewidth=0.8)
+    hands.legend(
+        loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, labelcolor=theme.text
+    )
+    notes.axhline(3.0, color=theme.wrong, linewidth=0.8)
     notes.set_ylabel("finger off key [1/3 key]")
     notes.set_xlabel("time [s]")
+    for axes in (hands, notes):
+        axes.set_facecolor(theme.paper)
+        axes.grid(color=theme.lines, linewidth=0.6)
+        axes.tick_params(colors=theme.faint_text, length=0)
+        axes.xaxis.label.set_color(theme.faint_text)
+        axes.yaxis.label.set_color(theme.faint_text)
+        for spine in axes.spines.values():
+            spine.set_visible(False)
     picture = io.BytesIO()
     figure.savefig(picture, format="png", dpi=110)
     return picture.getvalue()
@@ -114,7 +134,3 @@ def _png(picture: NDArray[np.uint8]) -> bytes:
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "png")
     return file.getvalue()
-
-
-def _data(png: bytes) -> str:
-    return f"data:image/png;base64,{base64.b64encode(png).decode()}"

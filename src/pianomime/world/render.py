@@ -6,13 +6,10 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cache
 from types import TracebackType
-from typing import Any
 
 import av
 import mujoco
@@ -20,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pianomime.files import atomic
-from pianomime.keyboard import FRAME_RATE, KEYS
+from pianomime.keyboard import KEYS
+from pianomime.mp4 import Mp4
 from pianomime.music.sound import SAMPLE_RATE
 from pianomime.music.wav import WavFile
 from pianomime.progress import Progress, no_progress
@@ -28,7 +26,6 @@ from pianomime.world.model import build_spec
 from pianomime.world.scene_look import CAMERAS, LAMP_OFF, dress, key_colours
 
 _MAX_GEOMS = 1000
-_FPS = round(FRAME_RATE)
 # Edges are smoothed by rendering larger and shrinking: with OpenGL in software this costs half as
 # much as multisampling.
 _VIDEO_OVERSIZE = 1.5
@@ -231,44 +228,13 @@ def write_video(
     with (
         Painter(*_oversize(view.size, _VIDEO_OVERSIZE), view.camera) as painter,
         atomic(path) as temporary,
-        _open_mp4(temporary, view.size, None if audio is None else sample_rate) as streams,
+        Mp4(temporary, view.size, None if audio is None else sample_rate) as film,
     ):
-        file, pictures, sound = streams
         for frame in range(frames):
             shown = key_colours(pressed[frame]) if colours is None else colours(frame)
-            picture = _video_frame(painter.paint(qpos[frame], shown)).reformat(
-                *view.size, "yuv420p", interpolation=_SHRINKING
-            )
-            picture.pts, picture.time_base = frame, Fraction(1, _FPS)
-            file.mux(pictures.encode(picture))
-            if audio is not None:
-                # Writing a frame's sound right after its picture interleaves them in the file.
-                start, end = (round(at * sample_rate / _FPS) for at in (frame, frame + 1))
-                file.mux(sound.encode(_sound(audio, start, end, sample_rate)))
+            sound = None if audio is None else audio[slice(*film.span)]
+            film.add(painter.paint(qpos[frame], shown), sound)
             progress("rendering", frame + 1, frames)
-
-
-@contextmanager
-def _open_mp4(
-    path: os.PathLike[str], size: tuple[int, int], sample_rate: int | None
-) -> Iterator[tuple[Any, Any, Any]]:
-    """Yields an open MP4 file, its stream of pictures, and that of sound or None.
-
-    Leaving the block writes what the encoders still hold.
-    """
-    # An index at the front lets a browser start before it has loaded the whole file.
-    with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as file:
-        pictures: Any = file.add_stream("libx264", rate=_FPS)
-        pictures.width, pictures.height = size
-        pictures.pix_fmt = "yuv420p"
-        pictures.options = {"crf": "20", "preset": "veryfast"}
-        sound: Any = None
-        if sample_rate is not None:
-            sound = file.add_stream("aac", rate=sample_rate, layout="stereo")
-        yield file, pictures, sound
-        for stream in (pictures, sound):
-            if stream is not None:
-                file.mux(stream.encode(None))
 
 
 def _oversize(size: tuple[int, int], factor: float) -> tuple[int, int]:
@@ -278,19 +244,6 @@ def _oversize(size: tuple[int, int], factor: float) -> tuple[int, int]:
 
 def _video_frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
     return av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-
-
-def _sound(
-    audio: NDArray[np.float32] | WavFile, start: int, end: int, sample_rate: int
-) -> av.AudioFrame:
-    """Samples start..end as a frame to encode, padded with silence after the end of the sound."""
-    samples = np.zeros((2, end - start), np.float32)
-    there = audio[start:end].T
-    samples[:, : there.shape[1]] = there
-    sound = av.AudioFrame.from_ndarray(samples, format="fltp", layout="stereo")
-    sound.sample_rate = sample_rate
-    sound.pts, sound.time_base = start, Fraction(1, sample_rate)
-    return sound
 
 
 def _dressed_model(width: int, height: int) -> mujoco.MjModel:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import BLACK, KEYS
+from pianomime.palette import DARK, rgb
 from pianomime.world.parameters import key_centres
 
 CAMERAS = ("player", "top", "side")
@@ -25,8 +26,10 @@ PRESSED_KEY = (0.25, 0.78, 0.42)
 LAMP_OFF = (0.07, 0.07, 0.08)
 """Colours (red, green, blue), 0..1."""
 
-# Each hand has the same hue in every picture of a performance.
-_ACCENT = {"lh": (0.26, 0.52, 0.83, 1.0), "rh": (0.95, 0.55, 0.22, 1.0)}
+_ACCENT = {
+    side: tuple(part / 255 for part in rgb(colour))
+    for side, colour in zip(("lh", "rh"), DARK.hands[:2], strict=True)
+}
 _HIDDEN_GROUP = 3
 _SKIN_GROUP = 1
 

@@ -8,6 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from pianomime.files import atomic
+from pianomime.palette import LIGHT
 from pianomime.workers import Row
 
 
@@ -22,10 +23,10 @@ def draw_f1_chart(rows: list[Row], path: Path) -> None:
     figure = Figure(figsize=(8, 3), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    axes.bar(range(1, len(f1) + 1), f1, width=1.0, color="#4c72b0", edgecolor="white")
+    axes.bar(range(1, len(f1) + 1), f1, width=1.0, color=LIGHT.hands[0], edgecolor="white")
     if f1:
         mean = sum(f1) / len(f1)
-        axes.axhline(mean, color="#c44e52", linewidth=1, label=f"mean {mean:.3f}")
+        axes.axhline(mean, color=LIGHT.wrong, linewidth=1, label=f"mean {mean:.3f}")
         axes.legend(loc="lower left")
     axes.set(xlabel="experts, best first", ylabel="F1", ylim=(0, 1), xlim=(0.5, len(f1) + 0.5))
     with atomic(path) as temporary:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.video.film.media import open_media
 from pianomime.video.film.read_ahead import ahead
 
 _WIDEST = 1280
@@ -50,6 +51,7 @@ class Film:
         height: height of the pictures, after that rotation [pixels].
         zoom: that size divided by the working size, at which pictures are returned.
         seconds: length of the video from its header [s]; 0 if it has none.
+        start: time of the first picture in the file, whose sound may begin elsewhere [s].
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -69,7 +71,7 @@ class Film:
             if first is None:
                 raise InputError(f"{self.path}: no picture in it can be read")
             self._turns = round(getattr(first, "rotation", 0) / 90) % 4
-            self._start = first.time or 0.0
+            self.start = first.time or 0.0
             self._timed = first.time is not None
             size = (first.width, first.height)
             self.width, self.height = size if self._turns % 2 == 0 else size[::-1]
@@ -99,11 +101,11 @@ class Film:
             stream.thread_type = "AUTO"
             # If the file has no times, frames can only be counted from its beginning.
             if due and self._timed:
-                goal = self._start + due / rate - self._interval
+                goal = self.start + due / rate - self._interval
                 with suppress(av.error.FFmpegError):
                     container.seek(int(goal / stream.time_base), stream=stream)
             for count, frame in enumerate(self._decode(container, stream)):
-                at = count * self._interval if frame.time is None else frame.time - self._start
+                at = count * self._interval if frame.time is None else frame.time - self.start
                 while before is not None and due / rate < at:
                     nearest = before if due / rate - before[0] <= at - due / rate else (at, frame)
                     last = self._picture(*nearest, last)
@@ -155,7 +157,7 @@ class Film:
         with self._open() as (container, stream):
             stream.thread_type = "AUTO"
             for number in range(count):
-                goal = self._start + self.seconds * (number + 0.5) / count
+                goal = self.start + self.seconds * (number + 0.5) / count
                 try:
                     container.seek(int(goal / stream.time_base), stream=stream)
                 except av.error.FFmpegError:
@@ -185,14 +187,7 @@ class Film:
     @contextmanager
     def _open(self) -> Iterator[tuple[Any, Any]]:
         """The open file, and its stream of pictures."""
-        try:
-            # In full: a relative name such as `concat:x.mp4` would be taken for an address.
-            container = av.open(os.path.abspath(self.path))
-        except FileNotFoundError:
-            raise InputError(f"{self.path}: does not exist") from None
-        except (av.error.FFmpegError, OSError) as error:
-            raise InputError(f"{self.path}: not a video") from error
-        with container:
+        with open_media(self.path) as container:
             pictures = [
                 stream
                 for stream in container.streams.video

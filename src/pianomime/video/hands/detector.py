@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any
@@ -15,10 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.installation import install_command
 from pianomime.video.hands.sightings import Sighting
 
 _LANDMARKS = [0, 4, 8, 12, 16, 20]
 """Indices of MediaPipe's landmarks of the wrist and the fingertips, thumb first."""
+
+
+def check_mediapipe() -> None:
+    """Refuse to begin where MediaPipe is not installed or does not load.
+
+    Raises:
+        InputError: the message says what to install.
+    """
+    if find_spec("mediapipe") is None:
+        raise InputError(f"MediaPipe is needed to detect hands: {install_command('video')}")
+    _, vision = _mediapipe()
+    nothing = _options(vision, b"no model")
+    try:
+        # MediaPipe loads its native library before it looks at the model.
+        with _quiet():
+            vision.HandLandmarker.create_from_options(nothing).close()
+    except OSError as error:
+        raise InputError(_advice(error)) from error
+    except (RuntimeError, ValueError):
+        pass
 
 
 class HandDetector:
@@ -35,11 +57,7 @@ class HandDetector:
         """
         mediapipe, vision = _mediapipe()
         self._image, self._format = mediapipe.Image, mediapipe.ImageFormat.SRGB
-        options = vision.HandLandmarkerOptions(
-            base_options=mediapipe.tasks.BaseOptions(model_asset_buffer=model.read_bytes()),
-            running_mode=vision.RunningMode.VIDEO,
-            num_hands=2,
-        )
+        options = _options(vision, model.read_bytes())
         self._first = True
         try:
             with _quiet():
@@ -84,6 +102,15 @@ class HandDetector:
         return sightings
 
 
+def _options(vision: Any, model: bytes) -> Any:
+    base = importlib.import_module("mediapipe.tasks.python").BaseOptions
+    return vision.HandLandmarkerOptions(
+        base_options=base(model_asset_buffer=model),
+        running_mode=vision.RunningMode.VIDEO,
+        num_hands=2,
+    )
+
+
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Discard what native code writes to stderr."""
@@ -110,7 +137,7 @@ def _mediapipe() -> tuple[Any, Any]:
         return mediapipe, importlib.import_module("mediapipe.tasks.python.vision")
     except ImportError as error:
         raise InputError(
-            f"MediaPipe is needed to detect hands: pip install 'pianomime[video]' ({error})"
+            f"MediaPipe is needed to detect hands: {install_command('video')} ({error})"
         ) from error
     except OSError as error:
         raise InputError(_advice(error)) from error

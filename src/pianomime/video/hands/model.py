@@ -18,8 +18,10 @@ URL = (
     + NAME
 )
 SHA256 = "fbc2a30080c3c557093b5ddfc334698132eb341044ccee322ccf8bcf3607cde1"
-_TIMEOUT = 30.0
+_TIMEOUT = 10.0
 """[s] Longest wait for the server."""
+_LARGEST = 64 << 20
+"""[bytes] No more is read from the server; the model has 8 MB."""
 
 
 def find_hand_model(given: Path | None = None, url: str = URL) -> Path:
@@ -42,7 +44,7 @@ def find_hand_model(given: Path | None = None, url: str = URL) -> Path:
         return cached
     try:
         with urllib.request.urlopen(url, timeout=_TIMEOUT) as answer:
-            content: bytes = answer.read()
+            content: bytes = answer.read(_LARGEST)
     except (urllib.error.URLError, HTTPException, OSError, ValueError) as error:
         raise InputError(
             f"MediaPipe's hand model cannot be downloaded ({error}); get {url} on another machine "

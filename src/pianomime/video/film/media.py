@@ -1,0 +1,35 @@
+"""Opening of video files, which may come from anybody."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import av
+
+from pianomime.errors import InputError
+
+
+@contextmanager
+def open_media(path: str | os.PathLike[str]) -> Iterator[Any]:
+    """Yields the open container of PyAV.
+
+    Nothing but files is read, whatever the name looks like: FFmpeg would take a relative name such
+    as "concat:x.mp4" for an address.
+
+    Args:
+        path: the file.
+
+    Raises:
+        InputError: it does not exist, or is no video or sound.
+    """
+    try:
+        container = av.open(os.path.abspath(path), options={"protocol_whitelist": "file"})
+    except FileNotFoundError:
+        raise InputError(f"{path}: does not exist") from None
+    except (av.error.FFmpegError, OSError, ValueError) as error:
+        raise InputError(f"{path}: not a video") from error
+    with container:
+        yield container
