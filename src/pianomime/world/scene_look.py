@@ -129,7 +129,7 @@ def _set_up_rendering(spec: mujoco.MjSpec) -> None:
 
 
 def _add_materials(spec: mujoco.MjSpec) -> None:
-    for name, rgb, specular, shininess in (
+    for name, colour, specular, shininess in (
         ("white_key", WHITE_KEY, 0.25, 0.6),
         ("black_key", BLACK_KEY, 0.5, 0.7),
         ("lacquer", (0.035, 0.035, 0.042), 0.6, 0.8),
@@ -141,7 +141,7 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         ("accent_lh", _ACCENT["lh"], 0.3, 0.5),
         ("accent_rh", _ACCENT["rh"], 0.3, 0.5),
     ):
-        spec.add_material(name=name, rgba=(*rgb[:3], 1.0), specular=specular, shininess=shininess)
+        spec.add_material(name=name, rgba=(*colour[:3], 1.0), specular=specular, shininess=shininess)
 
 
 def _add_scenery(spec: mujoco.MjSpec) -> None:
