@@ -141,7 +141,9 @@ def _add_materials(spec: mujoco.MjSpec) -> None:
         ("accent_lh", _ACCENT["lh"], 0.3, 0.5),
         ("accent_rh", _ACCENT["rh"], 0.3, 0.5),
     ):
-        spec.add_material(name=name, rgba=(*colour[:3], 1.0), specular=specular, shininess=shininess)
+        spec.add_material(
+            name=name, rgba=(*colour[:3], 1.0), specular=specular, shininess=shininess
+        )
 
 
 def _add_scenery(spec: mujoco.MjSpec) -> None:
