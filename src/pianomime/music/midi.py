@@ -26,6 +26,7 @@ from pianomime.music.midi_events import (
     read_events,
 )
 from pianomime.music.score import MAX_SECONDS, Score, ScoreError
+from pianomime.shown import title_of
 
 _MOST_BYTES = 32 << 20
 """Largest file that is read; four hours of music take less than a megabyte."""
@@ -86,7 +87,7 @@ def read_midi(path: Path) -> Score:
         offset=offset[on_piano],
         velocity=velocity[on_piano],
         pedal=np.concatenate(pedals),
-        title=path.stem,
+        title=title_of(path),
         remarks=tuple(remarks),
     )
 
@@ -125,10 +126,8 @@ def midi_bytes(score: Score) -> bytes:
             events.append((0, on, 1, mido.Message("control_change", value=127, **pedal)))
             events.append((0, off, 1, mido.Message("control_change", value=0, **pedal)))
     events.sort(key=lambda event: event[:3])
-    # Half of a character cannot be written: it stands for a byte of a file's name.
-    name = score.title.encode("utf-8", "replace").decode("utf-8")
     tempo = mido.bpm2tempo(_WRITTEN_BEATS_PER_MINUTE)
-    tracks[0].append(mido.MetaMessage("track_name", name=name))
+    tracks[0].append(mido.MetaMessage("track_name", name=score.title))
     tracks[0].append(mido.MetaMessage("set_tempo", tempo=tempo))
     now = [0] * len(tracks)
     for track, tick, _, message in events:

@@ -78,6 +78,7 @@ class Score:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "title", shown(self.title))
+        object.__setattr__(self, "remarks", tuple(self.remarks))
 
     @classmethod
     def from_midi(cls, path: str | os.PathLike[str]) -> Score:
