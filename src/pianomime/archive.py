@@ -120,6 +120,9 @@ def _read(
     with ZipFile(path) as archive:
         members = {each.filename.removesuffix(".npy"): each for each in archive.infolist()}
         check_names([each.removesuffix(".npy") for each in archive.namelist()], schema, more)
+        for member in members.values():
+            # A damaged name is found by its copy; what it should be may be optional.
+            archive.open(member).close()
         for name in [name for name in schema if name in members]:
             with archive.open(members[name]) as file:
                 dtype, shape, first = _layout(file)

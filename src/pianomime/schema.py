@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 
-MOST_BYTES = 1 << 30
+MOST_BYTES = 1024**3
 """Bytes of the largest array that is read: what claims more is damaged."""
+_MOST_INT = 2**63 - 1
+"""The largest whole number that arrays can hold."""
 
 _KINDS = {"bool": "b", "int": "iu", "float": "f", "number": "biuf", "text": "U"}
 """Kinds of dtypes, as `numpy.dtype.kind`."""
@@ -127,6 +129,8 @@ class Field:
         if self.kind == "text":
             self._check_choice(name, value)
         elif self.kind in ("int", "float"):
+            if isinstance(value, int) and abs(value) > _MOST_INT:
+                raise InputError(f"{name} is too large")
             if not (math.isfinite(value) or (self.may_be_infinite and value == math.inf)):
                 raise InputError(f"{name} must be finite")
             self._check_range(name, value)

@@ -11,7 +11,7 @@ from pianomime.errors import InputError
 from pianomime.schema import Schema, check_json
 from pianomime.seal import SEAL, seal_of
 
-_MOST_BYTES = 64 << 20
+_MOST_BYTES = 64 * 1024**2
 """Bytes of the largest file that is read: what is larger was not written by this program."""
 
 
@@ -39,7 +39,7 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     with Path(path).open("rb") as file:
         text = file.read(_MOST_BYTES + 1)
     if len(text) > _MOST_BYTES:
-        raise InputError(f"it is larger than {_MOST_BYTES >> 20} MiB")
+        raise InputError(f"it is larger than {_MOST_BYTES // 1024**2} MiB")
     return parse_json(text)
 
 

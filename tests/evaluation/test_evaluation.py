@@ -101,6 +101,34 @@ def test_finished_songs_are_not_played_again(folder: Path, tmp_path: Path) -> No
     assert len(list((out / "songs").iterdir())) == 5 + 3
 
 
+@pytest.mark.parametrize(
+    "damage", ["F1 edited", "F1 as text", "a list", "nested", "another's", "empty"]
+)
+def test_damaged_results_are_played_again_and_not_reported(tmp_path: Path, damage: str) -> None:
+    name = songs.names()[0]
+    out = tmp_path / "out"
+    first = evaluate(name, "zero-shot-ik", seconds=1.0, jobs=1, out=out)
+    (file,) = (out / "songs").iterdir()
+    content = json.loads(file.read_text(encoding="utf-8"))
+    changed = {
+        "F1 edited": json.dumps({**content, "f1": 1.0}),
+        "F1 as text": json.dumps({**content, "f1": "1.0"}),
+        "a list": "[]",
+        "nested": "[" * 100_000,
+        "empty": "",
+        "another's": "",
+    }[damage]
+    if damage == "another's":
+        evaluate(name, "zero-shot-ik", seconds=1.5, jobs=1, out=tmp_path / "other")
+        (other,) = (tmp_path / "other" / "songs").iterdir()
+        changed = other.read_text(encoding="utf-8")
+    file.write_text(changed, encoding="utf-8")
+    with pytest.warns(UserWarning, match=r"damaged.* the song is played again"):
+        again = evaluate(name, "zero-shot-ik", seconds=1.0, jobs=1, out=out)
+    assert again["songs"][0]["f1"] == first["songs"][0]["f1"]
+    assert json.loads(file.read_text(encoding="utf-8"))["f1"] == first["songs"][0]["f1"]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="there is no kill -9 on Windows")
 def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import NO_KEY
 from pianomime.players.performance import Performance
+from pianomime.schema import Field, Schema
 from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.model import SIDES
@@ -187,6 +188,15 @@ def totals(diagnoses: Iterable[Diagnosis]) -> list[Total]:
     ]
 
 
+_FRAMES: dict[str, Schema] = {cause.value: Field("int", (), 1, optional=True) for cause in Cause}
+CAUSES_SCHEMA: dict[str, Schema] = {
+    "wanted": Field("int", (), 0),
+    "missed": _FRAMES,
+    "wrong": _FRAMES,
+}
+"""Schema of `frames_by_cause`."""
+
+
 def frames_by_cause(diagnosis: Diagnosis) -> dict[str, int | dict[str, int]]:
     """Key-frames `wanted`, and those `missed` and `wrong` by cause, the most first.
 
@@ -219,7 +229,7 @@ class _Scene:
     wanted: NDArray[np.bool_]
     pressed: NDArray[np.bool_]
     key_state: NDArray[np.float64]
-    note: NDArray[np.int64]
+    note: NDArray[np.int32]
     finger_key: NDArray[np.int8]
     planned: NDArray[np.float64]
     tips: NDArray[np.float64]
@@ -238,7 +248,7 @@ class _Scene:
         broken = np.zeros(len(performance), bool)
         for frame in performance.blow_ups:
             broken[frame : frame + _AFTERMATH] = True
-        note = np.full(performance.pressed.shape, NOBODY)
+        note = np.full(performance.pressed.shape, NOBODY, np.int32)
         for index, (first, stop) in enumerate(score.note_frames()):
             note[first:stop, score.key[index]] = index
         return cls(

@@ -6,23 +6,30 @@ import contextlib
 import hashlib
 import json
 import math
+import warnings
 from collections import Counter
-from collections.abc import Generator, Iterable, Mapping
-from contextlib import closing
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager, nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import pianomime
 from pianomime.errors import InputError
+from pianomime.evaluation.diagnose import CAUSES_SCHEMA
 from pianomime.evaluation.song_worker import SONG_WORKER, play_song
+from pianomime.evaluation.summary import ROW_SCHEMA
+from pianomime.file_names import file_name
 from pianomime.files import atomic, files_digest
 from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.players.player import Player
 from pianomime.players.registry import EFFORT, is_registered, load_player, player_files
 from pianomime.players.settings import flat
 from pianomime.progress import Progress, no_progress
+from pianomime.sealed_json import read_json, sealed, unsealed
+from pianomime.shown import markdown_cell, shown, title_of
 from pianomime.songs.find import find_songs
+from pianomime.staging import hold, sweep
 from pianomime.workers import answered, cores, work
 
 Row = dict[str, Any]
@@ -30,7 +37,7 @@ Row = dict[str, Any]
 `pianomime.evaluation.diagnose.frames_by_cause`, if the player plans), or `song` and `error`."""
 
 # Those that decide how a song is played.
-_LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy", "symusic")
+_LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy")
 
 
 def evaluate(
@@ -95,56 +102,56 @@ def evaluate(
         key = [str(player), effort, seed, chosen, f"{seconds:g}", files]
         made_by = f"{json.dumps(key, sort_keys=True)} {_program_hash()}"
     store = None if out is None else _Store(Path(out), made_by)
+    with nullcontext() if store is None else store.held():
+        rows: dict[Path, Row] = {}
 
-    rows: dict[Path, Row] = {}
+        def report() -> None:
+            f1 = [row["f1"] for row in rows.values() if "error" not in row]
+            remark = f"mean F1 {sum(f1) / len(f1):.3f}" if f1 else ""
+            progress("songs", len(rows), len(songs), remark)
 
-    def report() -> None:
-        f1 = [row["f1"] for row in rows.values() if "error" not in row]
-        remark = f"mean F1 {sum(f1) / len(f1):.3f}" if f1 else ""
-        progress("songs", len(rows), len(songs), remark)
+        report()
 
-    report()
-
-    waiting = []
-    for song in songs:
-        known = store.get(song) if store is not None and made_by else None
-        if known is None:
-            waiting.append(song)
+        waiting = []
+        for song in songs:
+            known = store.get(song) if store is not None and made_by else None
+            if known is None:
+                waiting.append(song)
+            else:
+                rows[song] = known
+                report()
+        if only_here:
+            playing = _in_this_process(waiting, loaded, seconds)
         else:
-            rows[song] = known
-            report()
-    if only_here:
-        playing = _in_this_process(waiting, loaded, seconds)
-    else:
-        setup = {
-            "player": str(player),
-            "effort": effort,
-            "seed": seed,
-            "settings": chosen,
-            "seconds": seconds,
-        }
-        playing = work(SONG_WORKER, waiting, jobs or cores(), setup, str)
-    with closing(playing) as played:
-        for song, result in played:
-            row = {"song": song.stem, **result}
-            if store is not None and "error" not in row:
-                store.put(song, row)
-            rows[song] = row
-            report()
+            setup = {
+                "player": str(player),
+                "effort": effort,
+                "seed": seed,
+                "settings": chosen,
+                "seconds": seconds,
+            }
+            playing = work(SONG_WORKER, waiting, jobs or cores(), setup, str)
+        with closing(playing) as played:
+            for song, result in played:
+                row = {"song": title_of(song), **result}
+                if store is not None and "error" not in row:
+                    store.put(song, row)
+                rows[song] = row
+                report()
 
-    results = {
-        "player": loaded.name if isinstance(player, Player) else str(player),
-        "effort": loaded.effort if isinstance(player, Player) else effort,
-        "seed": None if isinstance(player, Player) else seed,
-        "settings": chosen,
-        "seconds": seconds if math.isfinite(seconds) else None,
-        "songs": [rows[song] for song in songs],
-        "mean": _mean(list(rows.values())),
-        "causes": _causes(list(rows.values())),
-    }
-    if store is not None:
-        store.close(results)
-    return results
+        results = {
+            "player": shown(loaded.name if isinstance(player, Player) else player),
+            "effort": loaded.effort if isinstance(player, Player) else effort,
+            "seed": None if isinstance(player, Player) else seed,
+            "settings": chosen,
+            "seconds": seconds if math.isfinite(seconds) else None,
+            "songs": [rows[song] for song in songs],
+            "mean": _mean(list(rows.values())),
+            "causes": _causes(list(rows.values())),
+        }
+        if store is not None:
+            store.close(results)
+        return results
 
 
 def _checked(settings: dict[str, Any]) -> dict[str, Any]:
@@ -172,6 +179,23 @@ def _in_this_process(
         yield song, answered(lambda path: play_song(player, path, seconds), song)
 
 
+def read_row(path: Path) -> Row:
+    """The row of a finished song, from the file in which an evaluation keeps it.
+
+    Raises:
+        OSError: there is no such file, or it cannot be read.
+        InputError: it was changed since it was written, or belongs to another song or player.
+    """
+    try:
+        content = read_json(path)
+        # A player that does not plan has no causes.
+        planned = isinstance(content, dict) and "causes" in content
+        schema = {**ROW_SCHEMA, "causes": CAUSES_SCHEMA} if planned else ROW_SCHEMA
+        return unsealed(content, schema, path.name)
+    except InputError as error:
+        raise InputError(f"{path}: damaged, or not the result of a song ({error})") from error
+
+
 def markdown(results: dict[str, Any]) -> str:
     """The results as Markdown: a table of songs and their means, and one of causes.
 
@@ -188,11 +212,9 @@ def markdown(results: dict[str, Any]) -> str:
         return [f"{row[name]:.3f}" for name in columns[:-1]] + [f"{row[columns[-1]]:.1f}x"]
 
     for row in results["songs"]:
-        # A bar in a title or an error would end the cell.
-        song = str(row["song"]).replace("|", "\\|")
+        song = markdown_cell(row["song"])
         if "error" in row:
-            error = str(row["error"]).replace("|", "\\|")
-            lines.append(f"| {song} | failed: {error} | | | | | | | |")
+            lines.append(f"| {song} | failed: {markdown_cell(row['error'])} | | | | | | | |")
         else:
             whole = f"{row['dropped_notes']}/{row['notes']} | {row['blow_ups']}"
             lines.append(f"| {song} | {' | '.join(cells(row))} | {whole} |")
@@ -200,6 +222,13 @@ def markdown(results: dict[str, Any]) -> str:
     if mean:
         whole = f"{mean['dropped_notes']:.1f}/{mean['notes']:.1f} | {mean['blow_ups']:.1f}"
         lines.append(f"| **mean** | {' | '.join(cells(mean))} | {whole} |")
+    mended = [row for row in results["songs"] if row.get("remarks")]
+    if mended:
+        lines += ["", "| song | mended or left out when it was read |", "| --- | --- |"]
+        lines += [
+            f"| {markdown_cell(row['song'])} | {markdown_cell('; '.join(row['remarks']))} |"
+            for row in mended
+        ]
     causes = [
         (share, kind, cause)
         for kind, shares in results["causes"].items()
@@ -246,30 +275,50 @@ class _Store:
         self._songs = out / "songs"
         self._songs.mkdir(parents=True, exist_ok=True)
         self._made_by = made_by.encode()
+        self._files: dict[Path, Path] = {}
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Nobody else writes there meanwhile; what killed processes left there is removed."""
+        sweep(self._songs)
+        with hold(self._out):
+            yield
 
     def get(self, song: Path) -> Row | None:
+        """The row of a finished song; None where it has to be played, which a warning explains."""
         try:
-            row: Row = json.loads(self._file(song).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            path = self._file(song)
+        except OSError:  # It cannot be read: whoever plays it says why.
             return None
-        return row
+        try:
+            return read_row(path)
+        except FileNotFoundError:
+            pass
+        except (InputError, OSError) as error:
+            warnings.warn(f"{error}; the song is played again", stacklevel=2)
+        return None
 
     def put(self, song: Path, row: Row) -> None:
-        self._write(self._file(song), _json(row))
+        path = self._file(song)
+        self._write(path, _json(sealed(row, path.name)))
 
     def close(self, results: dict[str, Any]) -> None:
         self._write(self._out / "results.json", _json(results))
         self._write(self._out / "results.md", markdown(results))
 
     def _file(self, song: Path) -> Path:
-        digest = hashlib.sha256(self._made_by)
-        digest.update(song.read_bytes())
-        return self._songs / f"{song.stem}-{digest.hexdigest()[:16]}.json"
+        if song not in self._files:  # Read once: it may be changed while it is played.
+            digest = hashlib.sha256(self._made_by)
+            digest.update(song.read_bytes())
+            name = f"{file_name(song.stem)}-{digest.hexdigest()[:16]}.json"
+            self._files[song] = self._songs / name
+        return self._files[song]
 
     @staticmethod
     def _write(path: Path, text: str) -> None:
         with atomic(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            # Half a character, as in a setting that names a file, is written as JSON escapes it.
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def _json(content: dict[str, Any]) -> str:

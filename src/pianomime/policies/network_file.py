@@ -22,7 +22,7 @@ from pianomime.policies.policy import (
 from pianomime.policies.sampler import Sampler
 from pianomime.policies.stamp import check_stamp
 
-_MOST_BYTES = 1 << 30
+_MOST_BYTES = 1024**3
 """Bytes of the largest file that is read."""
 
 

@@ -13,8 +13,9 @@ import zarr
 from pianomime.commands.collect import Collect
 from pianomime.errors import InputError
 from pianomime.learn.data.episode import COLUMNS, Episode
+from pianomime.learn.data.format import VERSION
 from pianomime.learn.data.published import published_episodes, world_order
-from pianomime.learn.data.trajectories import VERSION, TrajectoryData, write_trajectories
+from pianomime.learn.data.trajectories import TrajectoryData, write_trajectories
 from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert import load_expert, train_expert
 from pianomime.learn.expert.expert_run import find_expert_runs
@@ -71,7 +72,7 @@ def test_it_reads_in_a_few_lines(runs: Path, tmp_path: Path) -> None:
     # A data set is replaced; anything else is not.
     Collect((runs / "a",), out).run()
     assert len(TrajectoryData.open(out)) == 1
-    with pytest.raises(InputError, match="not a data set of trajectories"):
+    with pytest.raises(InputError, match="something else than a data set"):
         Collect((runs,), runs).run()
 
 
@@ -104,7 +105,11 @@ def test_what_fails_leaves_the_older_data(
 
 @pytest.mark.parametrize(
     ("runs", "message"),
-    [((), "no runs"), ((Path("nowhere"),), "no run"), ((Path("x.npz"),), "--demonstrations")],
+    [
+        ((), "no runs"),
+        ((Path("nowhere"),), "does not exist; .*train-expert"),
+        ((Path("x.npz"),), "--demonstrations"),
+    ],
 )
 def test_bad_input(runs: tuple[Path, ...], message: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=message):
@@ -184,6 +189,35 @@ def test_a_damaged_data_set_is_one_line(two_notes: Demonstration, tmp_path: Path
             TrajectoryData.open(out)
 
 
+@pytest.mark.parametrize("how", ["gone", "swapped", "flipped", "f1", "chunk shape", "a day"])
+def test_what_a_data_set_does_not_show_is_found(tmp_path: Path, how: str) -> None:
+    columns = {
+        name: np.ones((5000, *column.shape), column.dtype) for name, column in COLUMNS.items()
+    }
+    columns["keys"][4096:] = 0.5
+    columns["keys"][:7] = 0.0
+    out = tmp_path / "experts.zarr"
+    write_trajectories(out, iter([Episode("one", 0.25, "ik", columns)]))
+    first, second = out / "keys" / "c" / "0" / "0", out / "keys" / "c" / "1" / "0"
+    group, keys = out / "zarr.json", out / "keys" / "zarr.json"
+    if how == "gone":
+        second.unlink()
+    elif how == "swapped":
+        second.write_bytes(first.read_bytes())
+    elif how == "flipped":
+        first.write_bytes(first.read_bytes()[:-9] + b"x" + first.read_bytes()[-8:])
+    elif how == "f1":
+        group.write_text(group.read_text().replace("0.25", "0.95"))
+    elif how == "chunk shape":
+        keys.write_text(keys.read_text().replace("4096", "0"))
+    else:
+        keys.write_text(keys.read_text().replace("5000", "5000000000000"))
+        group.write_text(group.read_text().replace("5000", "5000000000000"))
+    with pytest.raises(InputError, match="damaged") as caught:
+        TrajectoryData.open(out).episode(0)
+    assert "\n" not in str(caught.value)
+
+
 def test_published_files_of_another_shape(tmp_path: Path) -> None:
     published(tmp_path, np.zeros((6, 54)), np.zeros((6, 46)), np.zeros((6, 88)))
     np.savez(tmp_path / "other.npz", length=[3])
@@ -195,7 +229,7 @@ def test_published_files_of_another_shape(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="clip 7 is not as long"):
         next(published_episodes(tmp_path / "experts.npz", tmp_path / "longer.npz"))
     np.savez(tmp_path / "odd.npz", **{**arrays, "length": [11]})
-    with pytest.raises(InputError, match="do not add up"):
+    with pytest.raises(InputError, match="length must have"):
         next(published_episodes(tmp_path / "experts.npz", tmp_path / "odd.npz"))
     with pytest.raises(InputError, match="does not exist"):
         next(published_episodes(tmp_path / "none.npz", tmp_path / "other.npz"))

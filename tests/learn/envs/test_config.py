@@ -24,7 +24,7 @@ from pianomime.learn.envs.config import (
         (RewardConfig, {"mimic": math.inf}, "env.reward.mimic must be 0 or more, not inf"),
         (RewardConfig, {"pedal": -1.0}, "env.reward.pedal must be 0 or more, not -1"),
         (RewardConfig, {"hit": 7.0}, "env.reward.hit must be 0 to 1, not 7"),
-        (ActionConfig, {"factor": -0.1}, "env.action.factor must be 0 or more, not -0.1"),
+        (ActionConfig, {"factor": -0.1}, "env.action.factor must be 0 to 1, not -0.1"),
         (ObservationConfig, {"goal": -1}, "env.observation.goal must be 0 or more, not -1"),
         (
             ObservationConfig,

@@ -230,7 +230,7 @@ def test_a_training_that_was_stopped_comes_to_the_same(songs, tmp_path, monkeypa
 
 def test_the_file_acts_as_the_network_does(songs, tmp_path):
     from pianomime.learn.runs.safetensors_file import read_tensors
-    from pianomime.policies.policy import load_network
+    from pianomime.policies.network_file import load_network
 
     made, _ = train_fingers([songs], tmp_path / "out", SMALL, 1)
     run, info = load_network(made)

@@ -17,7 +17,7 @@ from pianomime.learn.imitation.samples import Samples
 from pianomime.learn.imitation.unet import FrameConvolution, TemporalEncoder
 from pianomime.policies.features import action_reference
 from pianomime.policies.methods import WEIGHTS
-from pianomime.policies.policy import load_policy
+from pianomime.policies.network_file import load_policy
 from pianomime.policies.sampler import Sampler
 
 INPUTS = ("goal", "frames", "vector")

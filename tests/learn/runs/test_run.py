@@ -18,7 +18,6 @@ import pytest
 
 from pianomime.errors import InputError
 from pianomime.learn.runs import run as run_module
-from pianomime.learn.runs.lock import run_lock
 from pianomime.learn.runs.run import RunFolder, is_run
 from pianomime.learn.runs.safetensors_file import write_tensors
 
@@ -89,7 +88,7 @@ def test_settings_that_may_differ_are_those_of_the_last_call(tmp_path: Path) -> 
 
 
 def test_a_folder_is_held_by_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_module, "run_lock", lambda path: run_lock(path, patience=0.0))
+    monkeypatch.setattr(run_module, "_PATIENCE", 0.0)
     with RunFolder.open(tmp_path / "run", "network", CONFIG):
         with pytest.raises(InputError, match="another process"):
             begin(tmp_path / "run")
@@ -100,21 +99,22 @@ def test_a_folder_is_held_by_one_process(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_what_a_kill_left_half_written_is_swept(tmp_path: Path) -> None:
     path = tmp_path / "run"
-    ours = (".run-a1b2c3", ".state-x_y", ".result-0000", ".song-0000")
+    ours = (".pianomime-0123456789abcdef", ".pianomime-ffffffffffffffff")
     for folder in (path, tmp_path / "resumed"):
         if folder != path:
             begin(folder)
         folder.mkdir(exist_ok=True)
         for name in ours:
-            (folder / name).mkdir()
-            (folder / name / "half").write_bytes(b"cut")
-        begin(folder, more_files=("song.npz",))
+            (folder / name / "out").mkdir(parents=True)
+            (folder / name / "out" / "half").write_bytes(b"cut")
+            (folder / name / "lock").touch()
+        begin(folder)
         assert [name for name in os.listdir(folder) if name.startswith(".")] == []
     # What is not ours stays.
     (path / ".mine").mkdir()
-    (path / ".song-0000").mkdir()
+    (path / ".run-a1b2c3").mkdir()
     begin(path)
-    assert {".mine", ".song-0000"} <= {*os.listdir(path)}
+    assert {".mine", ".run-a1b2c3"} <= {*os.listdir(path)}
 
 
 def test_folders_that_hold_something_else_are_left_alone(tmp_path: Path) -> None:
@@ -137,9 +137,9 @@ def test_folders_that_hold_something_else_are_left_alone(tmp_path: Path) -> None
         ("{", r"run\.json: damaged"),
         ("[]", r"run\.json: damaged"),
         ('{"kind": "network"}', r"run\.json: damaged"),
-        ('{"run_version": 2}', r"run\.json: damaged"),
-        ('{"run_version": 2, "kind": 3, "config": {}}', r"run\.json: damaged"),
-        ('{"run_version": 1}', "a run of version 1; this program reads 2"),
+        ('{"run_version": 3}', r"run\.json: damaged"),
+        ('{"run_version": 3, "kind": 3, "config": {}}', r"run\.json: damaged"),
+        ('{"run_version": 1}', "a run of version 1; this program reads 3"),
     ],
 )
 def test_damaged_configs_are_one_line(tmp_path: Path, content: str, message: str) -> None:

@@ -13,7 +13,7 @@ from pianomime.learn.sac import training
 from pianomime.learn.sac.config import SacConfig
 from pianomime.learn.sac.training import ACTION_SCALE, GoalSong, SacVecEnv, train_sac
 from pianomime.policies.methods import WEIGHTS
-from pianomime.policies.policy import load_network
+from pianomime.policies.network_file import load_network
 
 SMALL = SacConfig(
     total_steps=200,

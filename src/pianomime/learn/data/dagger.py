@@ -11,8 +11,7 @@ imitation learning", 2017).
 from __future__ import annotations
 
 import pickle
-import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -28,8 +27,9 @@ from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.finger_assignment import flat_heights
 from pianomime.policies.fingertip_policy import LearnedPlanner
 from pianomime.policies.methods import load_policy_tracker
-from pianomime.policies.policy import load_policy
+from pianomime.policies.network_file import load_policy
 from pianomime.policies.sampler import Sampler
+from pianomime.staging import scratch
 from pianomime.track import Controller, DynamicTracker, IkTracker
 from pianomime.track.dynamic import DynamicController
 from pianomime.workers import Answer, Row, cores, work
@@ -128,10 +128,25 @@ class _DaggerController:
         return ctrl
 
 
+def check_policies(config: DaggerConfig) -> None:
+    """Refuse policies that cannot play.
+
+    Raises:
+        InputError: one is not there, damaged, or of another level.
+    """
+    fingertips = config.fingertip_policy
+    if fingertips is not None and load_policy(fingertips).info.level != "high":
+        raise InputError(f"{fingertips}: not a policy that outputs fingertips")
+    if config.rollout_policy is not None:
+        load_policy_tracker(config.rollout_policy)
+
+
 def collect_dagger(
     demonstrations: Sequence[Demonstration], config: DaggerConfig, jobs: int | None = None
-) -> Iterator[Episode]:
+) -> Generator[Episode, None, None]:
     """Episodes of many demonstrations, in their order, several at a time.
+
+    Closing the generator ends the processes, also in the middle of work.
 
     Args:
         demonstrations: what to play.
@@ -142,13 +157,9 @@ def collect_dagger(
         InputError: a policy cannot be used.
         WorkFailed: a demonstration cannot be played.
     """
-    fingertips = config.fingertip_policy
-    if fingertips is not None and load_policy(fingertips).info.level != "high":
-        raise InputError(f"{fingertips}: not a policy that outputs fingertips")
-    if config.rollout_policy is not None:
-        load_policy_tracker(config.rollout_policy)
+    check_policies(config)
     # Episodes are large, and pass through files. Nobody else can write into this folder.
-    with tempfile.TemporaryDirectory(prefix="pianomime-") as folder:
+    with scratch() as folder:
 
         def request(number: int) -> dict[str, str]:
             names = {name: str(Path(folder, f"{number}.{name}")) for name in ("task", "episode")}

@@ -12,8 +12,8 @@ Experts: recorded joints, keys and controls become episodes in our order of join
 from __future__ import annotations
 
 import importlib
-import zipfile
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,11 +23,15 @@ from numpy.typing import NDArray
 
 from pianomime.archive import read_arrays
 from pianomime.errors import InputError
+from pianomime.installation import install_command
 from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
 from pianomime.plan.demonstration import TRAIN, Demonstration, on_grid
 from pianomime.plan.fingertip_plan import HOVER_HEIGHT
+from pianomime.plan.plan_arrays import FINGER_KEY, FINGERTIPS
+from pianomime.schema import MOST_BYTES, Field
+from pianomime.shown import shown
 from pianomime.track import IkTracker
 from pianomime.video.hands.repair import at_rest, outliers
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT, POINTS_SIZE
@@ -44,9 +48,44 @@ _UNDETECTED_HEIGHT = 0.1
 """[m] z above which a point was not detected and is in the robot's rest pose."""
 _JUMP = 0.10
 """[m] A point this far from its neighbours in time was detected wrongly."""
+_MOST_FRAMES = 10_000_000
+"""Frames of a data set, a hundred times those that were published."""
 _WIDTHS = (212, 184)
 """Columns of the high-level data set's state and action."""
 _ODD = "odd"
+_MARKS = {
+    "song_group": Field("int", ("C",), -1, optional=True),
+    "split": Field("text", ("C",), optional=True),
+    "odd": Field("bool", ("C",), optional=True),
+}
+"""What a file may say of each of its C clips."""
+_TIPS = Field("number", FINGERTIPS.shape, FINGERTIPS.least, FINGERTIPS.most, may_be_nan=True)
+_PACKED = Field("int", ("T", (KEYS + 7) // 8), 0, 255)
+_LENGTH = Field("int", ("C",), 1, _MOST_FRAMES)
+_CLIPS = {
+    "fingertips": _TIPS,
+    "goal": Field("number", ("T", KEYS), 0, 1, optional=True),
+    "goal_packed": replace(_PACKED, optional=True),
+    "length": replace(_LENGTH, optional=True),
+    **_MARKS,
+}
+"""Concatenated clips, or one."""
+_CLIP_ID = {"clip_id": Field("int", ("C",), 0), "length": _LENGTH}
+_HUMAN = {
+    **_CLIP_ID,
+    "fingertips": replace(_TIPS, may_be_nan=False),
+    "finger_key": FINGER_KEY,
+    "goal_packed": _PACKED,
+    **_MARKS,
+}
+_RECORDED = {
+    **_CLIP_ID,
+    "qpos_1e4": Field("number", ("T", LAYOUT.hands_size)),
+    "qvel_500": Field("number", ("T", LAYOUT.hands_size)),
+    "key_state_255": Field("number", ("T", KEYS), 0, 255),
+    "ctrl_1e4": Field("number", ("T", LAYOUT.ctrl_size)),
+}
+"""Experts' trajectories, and the demonstrations that they were trained on."""
 
 
 def read_published(source: Path, limit: int | None = None) -> Iterator[tuple[Demonstration, int]]:
@@ -68,7 +107,7 @@ def read_published(source: Path, limit: int | None = None) -> Iterator[tuple[Dem
         names = [source.stem]
     total = len(clips) if limit is None else min(limit, len(clips))
     for clip, name in zip(clips[:total], names, strict=False):
-        made = demonstration_of(clip.fingertips, clip.goal, name, source.name)
+        made = demonstration_of(clip.fingertips, clip.goal, name, shown(source.name))
         yield replace(made, song_id=clip.song_id, split=clip.split), total
 
 
@@ -86,20 +125,19 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
     # Late: `import-demos` works without the extra that episodes need.
     from pianomime.learn.data.episode import Episode, empty_columns, fill_columns
 
-    recorded = _arrays(experts, "clip_id length qpos_1e4 qvel_500 key_state_255 ctrl_1e4")
-    human = _arrays(
-        demonstrations, "clip_id length fingertips finger_key goal_packed", "song_group split odd"
-    )
+    recorded = _arrays(experts, _RECORDED)
+    human = _arrays(demonstrations, _HUMAN)
     for path, arrays, column in (
         (experts, recorded, "ctrl_1e4"),
         (demonstrations, human, "goal_packed"),
     ):
-        fits = arrays["length"].shape == arrays["clip_id"].shape
-        if not fits or arrays["length"].sum() != len(arrays[column]):
+        if arrays["length"].sum() != len(arrays[column]):
             raise InputError(f"{path}: the lengths of the clips do not add up")
     place = {clip: row for row, clip in enumerate(human["clip_id"].tolist())}
     human_ends = np.cumsum(human["length"])
-    song, split = _songs_and_splits(demonstrations, human, len(place))
+    if len(place) != len(human["clip_id"]):
+        raise InputError(f"{demonstrations}: a clip is there twice")
+    song, split = _songs_and_splits(human, len(place))
     ends = np.cumsum(recorded["length"])
     for clip, end, length in zip(
         recorded["clip_id"].tolist(), ends, recorded["length"], strict=True
@@ -122,7 +160,8 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         tips = human["fingertips"][theirs].astype(float)
         finger_key = human["finger_key"][theirs].astype(np.int8)
         columns["base_control"][:] = _ik_controls(tips, columns["joints"])
-        goal = np.unpackbits(human["goal_packed"][theirs], axis=1)[:, :KEYS].astype(bool)
+        packed = human["goal_packed"][theirs].astype(np.uint8)
+        goal = np.unpackbits(packed, axis=1)[:, :KEYS].astype(bool)
         f1 = fill_columns(columns, goal, tips, finger_key)
         name = f"clip{clip:03d}"
         row = place[clip]
@@ -148,28 +187,16 @@ def _ik_controls(
     return controller.controls(np.arange(frames), qpos)[0]
 
 
-def _songs_and_splits(
-    path: Path, arrays: dict[str, NDArray[Any]], clips: int
-) -> tuple[list[int], list[str]]:
+def _songs_and_splits(arrays: dict[str, NDArray[Any]], clips: int) -> tuple[list[int], list[str]]:
     """The song and the split of each clip, as far as a file of clips has them.
 
     Args:
-        path: of the file.
         arrays: `song_group`, `split` and `odd` of each clip, where it has them.
         clips: number of clips.
-
-    Raises:
-        InputError: they are of another kind or number.
     """
     song = arrays.get("song_group", np.full(clips, -1))
     split = arrays.get("split", np.full(clips, TRAIN))
     odd = arrays.get("odd", np.zeros(clips, bool))
-    kinds = (song.dtype.kind in "iu", split.dtype.kind == "U", odd.dtype == bool)
-    if not all(kinds) or not song.shape == split.shape == odd.shape == (clips,):
-        raise InputError(
-            f"{path}: song_group, split and odd must be whole numbers, texts and booleans, "
-            "one a clip"
-        )
     return song.tolist(), np.where(odd, _ODD, split).tolist()
 
 
@@ -289,26 +316,19 @@ class _Clip:
 
 
 def _npz(path: Path) -> list[_Clip]:
-    arrays = read_arrays(path, "an .npz file of arrays")
-    if "fingertips" not in arrays:
-        raise InputError(f"{path}: holds no fingertips")
+    arrays = read_arrays(path, "an .npz file of clips", _CLIPS)
     tips = arrays["fingertips"]
-    if tips.ndim != 4 or tips.shape[1:] != (2, POINT_COUNT, 3) or tips.dtype.kind not in "fiu":
-        raise InputError(f"{path}: fingertips must be numbers (T, 2, 6, 3), not {tips.shape}")
     goal: NDArray[np.bool_] | None = arrays.get("goal")
     packed = arrays.get("goal_packed")
     if packed is not None:
-        if packed.ndim != 2 or packed.dtype != np.uint8:
-            raise InputError(f"{path}: goal_packed must be bytes ({len(tips)}, {(KEYS + 7) // 8})")
-        goal = np.unpackbits(packed, axis=1)[:, :KEYS].astype(bool)
-    if goal is not None and goal.shape != (len(tips), KEYS):
-        raise InputError(f"{path}: goals must be ({len(tips)}, {KEYS}), not {goal.shape}")
+        goal = np.unpackbits(packed.astype(np.uint8), axis=1)[:, :KEYS].astype(bool)
+    # One clip says nothing of its length; its marks, if any, are those of one.
     length = arrays.get("length", np.array([len(tips)]))
-    if length.dtype.kind not in "iu" or length.ndim != 1 or (length < 1).any():
-        raise InputError(f"{path}: the lengths of the clips must be whole numbers from 1 on")
+    if any(len(arrays[name]) != len(length) for name in _MARKS if name in arrays):
+        raise InputError(f"{path}: song_group, split and odd must have one entry a clip")
     if int(length.sum()) != len(tips):
         raise InputError(f"{path}: the lengths of the clips do not add up to {len(tips)} frames")
-    song, split = _songs_and_splits(path, arrays, len(length))
+    song, split = _songs_and_splits(arrays, len(length))
     ends = np.cumsum(length)
     return [
         _Clip(
@@ -327,24 +347,30 @@ def _zarr(folder: Path) -> list[_Clip]:
         zarr: Any = importlib.import_module("zarr")
     except ImportError as error:
         raise InputError(
-            f"{folder}: reading it needs the package zarr: pip install -e '.[video]'"
+            f"{folder}: reading it needs the package zarr: {install_command('video')}"
         ) from error
     refusal = f"{folder}: not PianoMime's high-level data set"
     try:
         root = zarr.open_group(str(folder), mode="r")
         group, meta = (root.get(name, root) for name in ("data", "meta"))
-        widths = tuple(group[name].shape[1] for name in ("state", "action"))
-        if widths != _WIDTHS:
-            raise InputError(f"{refusal}: state and action have {widths} columns, not {_WIDTHS}")
+        state, action_array, end_array = group["state"], group["action"], meta["episode_ends"]
+        for array, width in zip((state, action_array), _WIDTHS, strict=True):
+            if array.ndim != 2 or array.shape[1] != width:
+                raise InputError(f"{refusal}: its columns are {array.shape[1:]}, not ({width},)")
         # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers; what follows are
         # those of the frames to come.
-        action = np.asarray(group["action"][:, : POINTS_SIZE + 2 * FINGER_COUNT])
-        ends = np.asarray(meta["episode_ends"]).astype(np.int64)
-    except InputError:
-        raise
+        columns = POINTS_SIZE + 2 * FINGER_COUNT
+        action = _whole("action", action_array)[:, :columns]
+        ends = _whole("episode_ends", end_array)
+        Field("number", ("C",), 0, _MOST_FRAMES).check_values("episode_ends", ends)
+        ends = ends.reshape(-1).astype(np.int64)
+        keys_of_fingers = Field("number", (), 0, 1)
+        keys_of_fingers.check_values("action", action[:, POINTS_SIZE:])
+        _TIPS.check_values("action", action[:, :POINTS_SIZE])
     # A damaged store raises what its codecs and its metadata happen to raise.
-    except (LookupError, ValueError, OSError, TypeError, AttributeError, RuntimeError) as error:
-        raise InputError(f"{refusal} ({error})") from error
+    except Exception as error:
+        reason = (str(error) or type(error).__name__).splitlines()[0].removeprefix(f"{refusal}: ")
+        raise InputError(f"{refusal} ({reason[:200]})") from error
     if not len(ends) or (np.diff(ends, prepend=-1) <= 0).any() or ends[-1] != len(action) - 1:
         raise InputError(f"{refusal}: its clips do not end where its {len(action)} rows do")
     clips: list[_Clip] = []
@@ -361,15 +387,24 @@ def _zarr(folder: Path) -> list[_Clip]:
     return clips
 
 
-def _arrays(path: Path, names: str, more: str = "") -> dict[str, NDArray[Any]]:
-    """Arrays of a file by name, and those of `more` that it has."""
+def _whole(name: str, array: Any) -> NDArray[Any]:
+    """A whole array of a zarr store; a chunk that is not there would read as zeros.
+
+    Raises:
+        InputError: a chunk is missing, or it is larger than any that was published.
+    """
+    sizes = [*array.shape, *array.chunks]
+    if array.dtype.kind not in "fiu" or min(sizes, default=0) < 1 or max(sizes) > _MOST_FRAMES:
+        raise InputError(f"{name} is of another type or size")
+    if max(math.prod(array.shape), math.prod(array.chunks)) * array.dtype.itemsize > MOST_BYTES:
+        raise InputError(f"{name} is larger than any that was published")
+    if array.nchunks_initialized != array.nchunks:
+        raise InputError(f"chunks of {name} are missing")
+    return np.asarray(array[:])
+
+
+def _arrays(path: Path, schema: Mapping[str, Field]) -> dict[str, NDArray[Any]]:
     try:
-        with np.load(path, allow_pickle=False) as file:
-            there = [name for name in more.split() if name in file]
-            return {name: file[name] for name in [*names.split(), *there]}
+        return read_arrays(path, "an .npz file of published clips", schema)
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist") from None
-    except KeyError as error:
-        raise InputError(f"{path}: has no {error.args[0]}") from error
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not an .npz file of arrays ({error})") from error

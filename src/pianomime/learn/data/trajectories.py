@@ -11,14 +11,16 @@ Read it with no more than zarr:
 
 The attribute `description` of every array says what it holds; the attribute `episodes` of the group
 has the name, the F1, the base controller, the song and the split of each episode.
+
+Every chunk ends with a checksum (CRC32C), which all readers of zarr compare. The attributes have a
+digest of each column of each episode, too: a chunk that is gone reads as zeros.
 """
 
 from __future__ import annotations
 
 import os
 import shutil
-import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,16 +28,35 @@ from typing import Any
 import numpy as np
 import zarr
 from numpy.typing import NDArray
+from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from pianomime.errors import InputError
-from pianomime.learn.data.episode import COLUMNS, Episode
+from pianomime.learn.data.episode import COLUMNS, Column, Episode
+from pianomime.learn.data.format import FORMAT, VERSION, zarr_attributes
+from pianomime.schema import Field, ListOf, Schema
+from pianomime.seal import seal_of
+from pianomime.sealed_json import sealed, unsealed
+from pianomime.staging import hold
 
-FORMAT = "pianomime experts"
-VERSION = 3
 _CHUNK = 4096
 """Rows in a chunk of the file."""
-_EPISODE = {"name", "f1", "base", "song_id", "split"}
+_DIGESTS = {name: Field("text") for name in COLUMNS}
+_EPISODE: dict[str, Schema] = {
+    "name": Field("text"),
+    "f1": Field("float", (), 0, 1),
+    "base": Field("text", choices=("ik", "dynamic")),
+    "song_id": Field("int", (), -1),
+    "split": Field("text"),
+    "digests": _DIGESTS,
+}
 """What is recorded of each episode."""
+_SCHEMA: dict[str, Schema] = {
+    "format": Field("text", choices=(FORMAT,)),
+    "version": Field("int"),
+    "ends": Field("int", ("E",), 1),
+    "episodes": ListOf(_EPISODE),
+}
+"""Attributes of the group; `ends` is what the array `episode_end` says."""
 
 
 def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
@@ -49,13 +70,14 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
         Number of episodes.
 
     Raises:
-        InputError: there is something else at the place, or there are no episodes.
+        InputError: there is something else at the place, another process writes there, or there
+            are no episodes.
         OSError: it cannot be written.
     """
     if path.exists():
         TrajectoryData.open(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{path.stem}-", dir=path.parent) as folder:
+    with hold(path) as folder:
         fresh = Path(folder, path.name)
         group = zarr.open_group(str(fresh), mode="w", zarr_format=3)
         for name, column in COLUMNS.items():
@@ -63,14 +85,16 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
                 name,
                 shape=(0, *column.shape),
                 dtype=column.dtype,
-                chunks=(_CHUNK, *column.shape),
+                chunks=_chunks(column),
+                compressors=[ZstdCodec(), Crc32cCodec()],
+                config={"write_empty_chunks": True},
             )
             array.attrs["description"] = column.description
         ends = [0]
         rows: list[Any] = []
         for episode in episodes:
-            for name in COLUMNS:
-                _array(group, name).append(episode.columns[name])
+            for name, column in COLUMNS.items():
+                _array(group, name).append(episode.columns[name].astype(column.dtype, copy=False))
             ends.append(ends[-1] + len(episode.columns["goal"]))
             rows.append(
                 {
@@ -79,13 +103,15 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
                     "base": episode.base,
                     "song_id": episode.song_id,
                     "split": episode.split,
+                    "digests": {name: _digest(episode.columns, name) for name in COLUMNS},
                 }
             )
         if not rows:
             raise InputError("there are no episodes to collect")
         end_array = group.create_array("episode_end", data=np.array(ends[1:], np.int64))
         end_array.attrs["description"] = "one past the last row of each episode"
-        group.attrs.update({"format": FORMAT, "version": VERSION, "episodes": rows})
+        content = {"format": FORMAT, "version": VERSION, "ends": ends[1:], "episodes": rows}
+        group.attrs.update(sealed(content))
         older = Path(folder, "older")
         if path.exists():
             os.replace(path, older)
@@ -120,36 +146,35 @@ class TrajectoryData:
         Raises:
             InputError: there is none, or one of another version or shape.
         """
-        try:
-            group = zarr.open_group(str(path), mode="r")
-            attributes = dict(group.attrs)
-        # A damaged store raises what its codecs and its metadata happen to raise.
-        except (OSError, LookupError, ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"{path}: not a data set of trajectories") from error
-        if attributes.get("format") != FORMAT:
+        attributes = zarr_attributes(path)
+        if attributes is None or attributes.get("format") != FORMAT:
             raise InputError(f"{path}: not a data set of trajectories")
         if attributes.get("version") != VERSION:
             raise InputError(
-                f"{path}: a data set of version {attributes.get('version')}; this program reads "
-                f"{VERSION}: collect it again"
+                f"{path}: a data set of version {_short(attributes.get('version'))}; this program "
+                f"reads {VERSION}: collect it again"
             )
         try:
-            ends = np.asarray(_array(group, "episode_end")[:])
-            shapes = {name: _array(group, name).shape for name in COLUMNS}
-        except (OSError, LookupError, ValueError, TypeError, RuntimeError) as error:
-            raise InputError(f"{path}: damaged ({error})") from error
-        whole = ends.ndim == 1 and ends.dtype.kind in "iu" and len(ends) > 0
-        if not whole or not (np.diff(ends, prepend=0) > 0).all():
-            raise InputError(f"{path}: damaged, its episodes do not end one after the other")
-        for name, column in COLUMNS.items():
-            if shapes[name] != (int(ends[-1]), *column.shape):
-                raise InputError(f"{path}: {name} has another shape")
-        episodes: Any = attributes.get("episodes")
-        if not isinstance(episodes, list) or len(episodes) != len(ends):
-            raise InputError(f"{path}: damaged, it does not describe each episode")
-        if not all(isinstance(one, dict) and one.keys() >= _EPISODE for one in episodes):
-            raise InputError(f"{path}: damaged, it lacks facts about its episodes")
-        return cls(group, ends, episodes)
+            content = unsealed(attributes, _SCHEMA)
+            ends = np.array(content["ends"], np.int64)
+            if len(ends) != len(content["episodes"]) or (np.diff(ends, prepend=0) <= 0).any():
+                raise InputError("its episodes do not end one after the other")
+            group = zarr.open_group(str(path), mode="r", zarr_format=3)
+            for name, column in COLUMNS.items():
+                # Before memory is taken for what may be declared alone.
+                array = _array(group, name)
+                right = (int(ends[-1]), *column.shape), _chunks(column), np.dtype(column.dtype)
+                if (array.shape, array.chunks, array.dtype) != right:
+                    raise InputError(f"{name} has another shape, type or chunk")
+            there = _array(group, "episode_end")
+            if there.shape != ends.shape or max(there.chunks) > len(ends):
+                raise InputError("episode_end has another shape or chunk")
+            if not np.array_equal(np.asarray(there[:]), ends):
+                raise InputError("episode_end is not what the attributes say")
+        # A damaged store raises what its codecs and its metadata happen to raise.
+        except Exception as error:
+            raise InputError(f"{path}: damaged ({_reason(error)})") from error
+        return cls(group, ends, content["episodes"])
 
     def __len__(self) -> int:
         """Number of episodes."""
@@ -163,11 +188,18 @@ class TrajectoryData:
         """
         first = int(self.ends[number - 1]) if number else 0
         rows = slice(first, int(self.ends[number]))
+        columns = {}
         try:
-            return {name: np.asarray(_array(self.group, name)[rows]) for name in names}
+            for name in names:
+                columns[name] = np.asarray(_array(self.group, name)[rows])
+                if _digest(columns, name) != self.episodes[number]["digests"][name]:
+                    raise InputError(f"{name} of episode {number} was changed or is missing")
+                if columns[name].dtype.kind == "f" and not np.isfinite(columns[name]).all():
+                    raise InputError(f"{name} of episode {number} is not finite")
         # A damaged store raises what its codecs happen to raise.
-        except (RuntimeError, ValueError, OSError) as error:
-            raise InputError(f"{self.group.store_path}: damaged ({error})") from error
+        except Exception as error:
+            raise InputError(f"{self.group.store_path}: damaged ({_reason(error)})") from error
+        return columns
 
     def episode(self, number: int) -> Episode:
         """One episode, in memory."""
@@ -187,3 +219,21 @@ def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
     if not isinstance(array, zarr.Array):
         raise TypeError(f"{name} is no array")
     return array
+
+
+def _chunks(column: Column) -> tuple[int, ...]:
+    return (_CHUNK, *column.shape)
+
+
+def _digest(columns: Mapping[str, NDArray[Any]], name: str) -> str:
+    """The seal of one column of an episode."""
+    return seal_of({name: columns[name].astype(COLUMNS[name].dtype, copy=False)})
+
+
+def _reason(error: Exception) -> str:
+    """The first line of an error of any library."""
+    return (str(error) or type(error).__name__).splitlines()[0][:200]
+
+
+def _short(value: object) -> str:
+    return repr(value)[:16]

@@ -83,7 +83,7 @@ class ResumableCallback(BaseCallback):
                     known["state"].setdefault(int(index), {})[field] = tensor
                 optimizer.load_state_dict(known)
             self._env.resume(parts["env"])
-        except (RuntimeError, LookupError, ValueError) as error:
+        except (RuntimeError, LookupError, ValueError, TypeError) as error:
             raise InputError(f"{path}: the checkpoint does not fit the config") from error
         self.model.num_timesteps = steps
         self._fresh = False

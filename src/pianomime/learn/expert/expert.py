@@ -13,7 +13,6 @@ from pianomime.plan.demonstration import DemonstrationPlanner
 from pianomime.players.player import PlannedPlayer, Player
 from pianomime.progress import Progress, no_progress
 from pianomime.track import ReplayTracker, Tracker
-from pianomime.world.layout import LAYOUT
 
 
 def train_expert(
@@ -98,9 +97,4 @@ def expert_tracker(run: ExpertRun) -> Tracker:
         from pianomime.learn.expert.residual_policy import ResidualPolicyTracker
 
         return ResidualPolicyTracker.from_arrays(run.demonstration, run.config, arrays)
-    if "ctrl" not in arrays or arrays["ctrl"].shape != (
-        len(run.demonstration.plan),
-        LAYOUT.ctrl_size,
-    ):
-        raise InputError(f"{run.path}: the expert's controls do not fit its song")
-    return ReplayTracker(arrays["ctrl"])
+    return ReplayTracker(run.controls_among(arrays))

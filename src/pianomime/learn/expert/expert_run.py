@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.learn.expert.config import ExpertConfig
@@ -17,12 +20,26 @@ from pianomime.learn.runs.config_json import from_json, to_json
 from pianomime.learn.runs.run import Checkpoint, RunFolder, is_run
 from pianomime.learn.runs.safetensors_file import Arrays
 from pianomime.plan.demonstration import Demonstration
+from pianomime.schema import Field, ListOf, check_json
+from pianomime.world.layout import LAYOUT
 
 _KIND = "expert"
 _DEMONSTRATION = "demonstration.npz"
 _CURVE = "curve.json"
 _EXCERPT = "excerpt"
 """Name, in the run's config, of what is known of the demonstration."""
+_EXCERPT_SCHEMA = {
+    "title": Field("text"),
+    "start": Field("float", (), 0),
+    "seconds": Field("float", (), 0, may_be_infinite=True),
+    "digest": Field("text"),
+}
+_SCORE = Field("float", (), 0, 1)
+_EVALUATION = {
+    "steps": Field("int", (), 0),
+    **dict.fromkeys(("precision", "recall", "f1"), _SCORE),
+}
+"""Schema of an `Evaluation`."""
 _MAY_DIFFER = ("total_steps", f"{_EXCERPT}.title", f"{_EXCERPT}.start", f"{_EXCERPT}.seconds")
 """More steps prolong a run; of the excerpt its content counts."""
 
@@ -86,9 +103,12 @@ class ExpertRun:
         if is_run(path):
             there = RunFolder.load(path).config.get(_EXCERPT)
             if isinstance(there, dict) and there.get("digest") != excerpt["digest"]:
-                raise InputError(f"{path}: holds a run on another song, {there.get('title')}")
+                raise InputError(
+                    f"{path}: holds a run on another song, or another part of it "
+                    f"({there.get('title')}); name another folder"
+                )
         content = {_EXCERPT: excerpt, **to_json(config)}
-        with RunFolder.open(path, _KIND, content, _MAY_DIFFER, (_DEMONSTRATION, _CURVE)) as folder:
+        with RunFolder.open(path, _KIND, content, _MAY_DIFFER) as folder:
             if not (path / _DEMONSTRATION).exists():
                 demonstration.save(path / _DEMONSTRATION)
             yield cls(folder, demonstration, config, start, seconds)
@@ -109,13 +129,16 @@ class ExpertRun:
                 "which holds its .onnx file"
             )
         try:
-            start, seconds = float(excerpt["start"]), float(excerpt["seconds"])
+            check_json(excerpt, _EXCERPT_SCHEMA)
             config = from_json(ExpertConfig, content)
-        except (KeyError, ValueError, TypeError) as error:
+        except InputError as error:
             raise InputError(f"{path}: its config cannot be read ({error})") from error
         if not (path / _DEMONSTRATION).exists():
             raise InputError(f"{path}: nothing was trained in this run yet")
-        return cls(folder, Demonstration.load(path / _DEMONSTRATION), config, start, seconds)
+        demonstration = Demonstration.load(path / _DEMONSTRATION)
+        if _digest(demonstration) != excerpt["digest"]:
+            raise InputError(f"{path / _DEMONSTRATION}: not the demonstration of this run")
+        return cls(folder, demonstration, config, excerpt["start"], excerpt["seconds"])
 
     @property
     def path(self) -> Path:
@@ -145,7 +168,13 @@ class ExpertRun:
             InputError: the file is damaged.
         """
         state = self.state()
-        return [] if state is None else [Evaluation(**row) for row in state.metadata["curve"]]
+        if state is None:
+            return []
+        try:
+            check_json(state.metadata, {"curve": ListOf(_EVALUATION)})
+        except InputError as error:
+            raise InputError(f"{self.path}: its curve cannot be read ({error})") from error
+        return [Evaluation(**row) for row in state.metadata["curve"]]
 
     def state(self) -> Checkpoint | None:
         """The last checkpoint, with the `curve`; None before the first.
@@ -174,7 +203,27 @@ class ExpertRun:
         """
         if not self.folder.has_result:
             raise InputError(f"{self.path}: nothing was trained in this run yet")
-        return self.folder.result()
+        arrays, measured = self.folder.result()
+        try:
+            check_json(measured, _EVALUATION)
+        except InputError as error:
+            raise InputError(f"{self.path}: its result cannot be read ({error})") from error
+        return arrays, measured
+
+    def controls_among(self, arrays: Arrays) -> NDArray[np.float64]:
+        """(T, 46) the controls of a trajectory search [rad, m].
+
+        Args:
+            arrays: of the best expert or of a checkpoint.
+
+        Raises:
+            InputError: there are none that fit the demonstration.
+        """
+        ctrl = arrays.get("ctrl")
+        wanted = len(self.demonstration.plan), LAYOUT.ctrl_size
+        if ctrl is None or ctrl.shape != wanted or ctrl.dtype != np.float64:
+            raise InputError(f"{self.path}: the expert's controls do not fit its song")
+        return ctrl
 
     def keep_best(self, arrays: Arrays, evaluation: Evaluation) -> None:
         """Keep an expert that is better than those before.

@@ -71,10 +71,11 @@ class ResidualPolicyTracker:
         """
         observer = Observer(default_observation_terms(config.env.observation))
         network = actor(config.ppo, observer.size, LAYOUT.ctrl_size + config.env.action.pedal)
-        weights = {name: torch.from_numpy(array.copy()) for name, array in arrays.items()}
         try:
-            network.load_state_dict(weights)
-        except RuntimeError as error:
+            network.load_state_dict(
+                {name: torch.from_numpy(array.copy()) for name, array in arrays.items()}
+            )
+        except (RuntimeError, TypeError) as error:
             raise InputError("the expert's weights do not fit its config") from error
         return cls(demonstration, config, network)
 

@@ -46,7 +46,7 @@ def search_trajectory(run: ExpertRun, threads: int, progress: Progress) -> None:
     """
     state = run.state()
     curve = run.curve()
-    ctrl = None if state is None else state.arrays["ctrl"]
+    ctrl = None if state is None else run.controls_among(state.arrays)
     steps = run.steps_done
     with closing(RunLog(run.tensorboard, steps + 1)) as log:
         while steps < run.config.total_steps:

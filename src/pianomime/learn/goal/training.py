@@ -21,6 +21,7 @@ from pianomime.learn.goal.sdf import KEYBOARD_LENGTH, QUERY_HIGH, QUERY_LOW, cha
 from pianomime.learn.runs.safetensors_file import read_tensors, write_tensors
 from pianomime.learn.runs.trainer import Batch, load_arrays, train_network
 from pianomime.progress import Progress, no_progress
+from pianomime.schema import Field, check_json
 
 _VERSION = 1
 _STANDARDIZED = 20_000
@@ -114,8 +115,12 @@ def load_autoencoder(folder: Path) -> GoalAutoencoder:
     """
     path = folder / RESULT
     arrays, metadata = read_tensors(path)
-    if metadata.get("version") != _VERSION or "octaves" not in metadata:
+    if metadata.get("version") != _VERSION:
         raise InputError(f"{path}: not a goal autoencoder, or one of another version")
+    try:
+        check_json(metadata, {"version": Field("int"), "octaves": Field("int", (), 0, 12)})
+    except InputError as error:
+        raise InputError(f"{path}: damaged ({error})") from error
     module = GoalAutoencoder(metadata["octaves"])
     load_arrays(module, arrays, path)
     return module.eval()

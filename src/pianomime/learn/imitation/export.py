@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,6 +25,8 @@ from pianomime.policies.policy import (
     PolicyInfo,
 )
 from pianomime.policies.sampler import Sampler
+from pianomime.policies.stamp import stamped
+from pianomime.staging import scratch
 
 _MIN_HALVED = 1024
 """Weights with fewer numbers than this are kept in 32 bits."""
@@ -68,10 +69,10 @@ def export_network(
     import onnx
 
     names = list(example)
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+    with scratch() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-        raw = Path(folder, "policy.onnx")
+        raw = folder / "policy.onnx"
         torch.onnx.export(
             _ByPosition(network, names).eval(),
             tuple(example.values()),
@@ -85,7 +86,7 @@ def export_network(
     _halve(model)
     onnx.helper.set_model_props(model, {METADATA: info.to_metadata()})
     with atomic(path) as temporary:
-        temporary.write_bytes(model.SerializeToString())
+        temporary.write_bytes(stamped(model.SerializeToString()))
 
 
 def torch_policy(

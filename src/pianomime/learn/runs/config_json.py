@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
+_MOST_INT = 2**63 - 1
+"""The largest whole number that arrays can hold."""
+
 
 def to_json(config: DataclassInstance) -> dict[str, Any]:
     """A config as nested dictionaries that JSON can hold."""
@@ -71,6 +74,8 @@ def _value(name: str, hint: Any, value: Any) -> Any:
         right = isinstance(value, int | float) and not isinstance(value, bool)
     else:
         right = type(value) is hint
+    if isinstance(value, int) and abs(value) > _MOST_INT:
+        right = False
     if not right:
         raise InputError(f"{name} cannot be {value!r}")
     return value

@@ -14,17 +14,23 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pianomime.errors import InputError
-from pianomime.files import atomic, leftovers, sweep
+from pianomime.files import atomic
 from pianomime.learn.runs.config_json import differences
-from pianomime.learn.runs.lock import run_lock
 from pianomime.learn.runs.safetensors_file import Arrays, read_tensors, write_tensors
+from pianomime.schema import Field, check_json
+from pianomime.sealed_json import read_json, sealed, unsealed
+from pianomime.staging import hold, is_staging
 
-VERSION = 2
-"""Of the folder's files; version 1 had other names."""
+VERSION = 3
+"""Of the folder's files; version 2 had no digests, version 1 other names."""
 
 _CONFIG = "run.json"
 _STATE = "state.safetensors"
 _RESULT = "result.safetensors"
+_SCHEMA = {"run_version": Field("int"), "kind": Field("text"), "config": Field("object")}
+_CHECKPOINT = {"steps": Field("int", (), 0), "metadata": Field("object")}
+_PATIENCE = 10.0
+"""[s] for a process that was stopped, or whose node is lost, to be gone."""
 
 
 class Checkpoint(NamedTuple):
@@ -61,9 +67,8 @@ class RunFolder:
         kind: str,
         config: Mapping[str, Any],
         may_differ: Collection[str] = (),
-        more_files: Collection[str] = (),
     ) -> Iterator[RunFolder]:
-        """Begin a run, or resume one of the same config; the folder is locked meanwhile.
+        """Begin a run, or resume one of the same config; nobody else trains there meanwhile.
 
         What a kill or a full disk left of files that were being written is removed.
 
@@ -73,15 +78,16 @@ class RunFolder:
             config: everything that the result depends on; for JSON.
             may_differ: names in the config, such as "trainer.evaluate_every", whose values may be
                 others than before; from now on those given hold.
-            more_files: names of other files that the caller writes into the folder.
 
         Raises:
             InputError: the folder holds another run or something else, or another process holds it.
             OSError: it cannot be written.
         """
         given: dict[str, Any] = json.loads(json.dumps(config))
-        files = (_CONFIG, _STATE, _RESULT, *more_files)
-        with run_lock(path):
+        if path.is_file():
+            raise InputError(f"{path}: is a file; a folder is needed")
+        path.mkdir(parents=True, exist_ok=True)
+        with hold(path, _PATIENCE):
             if (path / _CONFIG).exists():
                 there = cls.load(path)
                 if there.kind != kind:
@@ -95,11 +101,10 @@ class RunFolder:
                         f"{path}: holds a run with other settings ({', '.join(odd)}); "
                         "name another folder"
                     )
-            elif {file.name for file in path.iterdir()} - {*leftovers(path, files)}:
+            elif any(not is_staging(file.name) for file in path.iterdir()):
                 raise InputError(f"{path}: holds something else than a run; name another folder")
-            sweep(path, files)
             run = cls(path, kind, given)
-            content = {"run_version": VERSION, "kind": kind, "config": given}
+            content = sealed({"run_version": VERSION, "kind": kind, "config": given})
             with atomic(path / _CONFIG) as temporary:
                 temporary.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
             yield run
@@ -111,19 +116,21 @@ class RunFolder:
         Raises:
             InputError: there is none, it is damaged, or of another version.
         """
+        refusal = f"{path / _CONFIG}: damaged, or not that of a run"
         try:
-            content = json.loads((path / _CONFIG).read_text(encoding="utf-8"))
+            content = read_json(path / _CONFIG)
             version = content["run_version"]
+            if version == VERSION:
+                content = unsealed(content, _SCHEMA)
         except (FileNotFoundError, NotADirectoryError):
             raise InputError(f"{path}: not the folder of a run (it has no {_CONFIG})") from None
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{path / _CONFIG}: damaged, or not that of a run") from error
+        except InputError as error:
+            raise InputError(f"{refusal} ({error})") from error
+        except (OSError, LookupError, TypeError) as error:
+            raise InputError(refusal) from error
         if version != VERSION:
             raise InputError(f"{path}: a run of version {version}; this program reads {VERSION}")
-        kind, config = content.get("kind"), content.get("config")
-        if not isinstance(kind, str) or not isinstance(config, dict):
-            raise InputError(f"{path / _CONFIG}: damaged, or not that of a run")
-        return cls(path, kind, config)
+        return cls(path, content["kind"], content["config"])
 
     @property
     def tensorboard(self) -> Path:
@@ -141,9 +148,12 @@ class RunFolder:
             return None
         arrays, content = read_tensors(path)
         try:
-            return Checkpoint(arrays, int(content["steps"]), content["metadata"])
-        except (LookupError, ValueError, TypeError) as error:
-            raise InputError(f"{path}: damaged, or not the checkpoint of a run") from error
+            check_json(content, _CHECKPOINT)
+        except InputError as error:
+            raise InputError(
+                f"{path}: damaged, or not the checkpoint of a run ({error})"
+            ) from error
+        return Checkpoint(arrays, content["steps"], content["metadata"])
 
     def checkpoint(
         self, arrays: Arrays, steps: int, metadata: Mapping[str, Any] | None = None

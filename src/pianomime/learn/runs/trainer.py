@@ -240,7 +240,7 @@ class _Learner:
         self.step = step
         try:
             self._resume_moments(parts["average"], parts["adam"])
-        except (LookupError, ValueError, RuntimeError) as error:
+        except (LookupError, ValueError, TypeError, RuntimeError) as error:
             raise InputError(f"{path}: the checkpoint does not fit the config") from error
 
     def _resume_moments(self, averages: Arrays, moments: Arrays) -> None:
@@ -370,8 +370,7 @@ def load_arrays(module: nn.Module, arrays: Arrays, path: Path) -> None:
     Raises:
         InputError: they are those of another.
     """
-    weights = {name: torch.tensor(array) for name, array in arrays.items()}
     try:
-        module.load_state_dict(weights)
-    except RuntimeError as error:
+        module.load_state_dict({name: torch.tensor(array) for name, array in arrays.items()})
+    except (RuntimeError, TypeError) as error:
         raise InputError(f"{path}: holds the weights of another network") from error
