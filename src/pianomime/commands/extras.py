@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from pianomime.errors import InputError
+from pianomime.installation import install_command
 
 
 @contextmanager
@@ -21,6 +22,9 @@ def extra(name: str) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as missing:
+        # One of our own that is missing is a fault of ours, and no extra brings it.
+        if (missing.name or "").partition(".")[0] in ("", "pianomime"):
+            raise
         raise InputError(
-            f"this needs the package {missing.name}: pip install 'pianomime[{name}]'"
+            f"this needs the package {missing.name}: {install_command(name)}"
         ) from missing
