@@ -167,7 +167,8 @@ def main() -> None:
     options.add_argument(_PLAY, nargs=2, type=Path, help="used by this command itself")
     arguments = options.parse_args()
     if arguments.play:
-        play(*arguments.play, arguments.effort, arguments.video)
+        midi, out = arguments.play
+        play(midi, out, arguments.effort, arguments.video)
         return
     facts = common.machine()
     common.show_machine(facts)

@@ -77,7 +77,7 @@ _ROWS = {
     "realtime_factor": ("Seconds of music per second of computing", "{:.1f}"),
 }
 
-MOST_EMBEDDED = 16 << 20
+MOST_EMBEDDED = 16 * 1024**2
 """[bytes] Larger files stand beside the page: sound of more than 17 minutes, and long films."""
 
 
@@ -120,6 +120,11 @@ def page(
         warning = (
             '<section class="warning">The physics became unstable during this performance, and the '
             "hands were put back: the metrics may be worse than the player.</section>\n"
+        )
+    if remarks := summary["remarks"]:
+        warning += (
+            '<section class="warning">While the score was read: '
+            f"{escape('; '.join(remarks))}.</section>\n"
         )
     body = _BODY.substitute(
         song=escape(str(summary["song"])),
