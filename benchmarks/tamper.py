@@ -445,8 +445,8 @@ def _edit_json(content: Any, rng: Rng, plausible: bool) -> tuple[Any, str]:
     name, value = place[-1], inner[place[-1]]
     if not plausible:
         way = int(rng.integers(4))
-        # One point less, or a cause that did not occur, is a valid file.
-        needed = len(place) == 1 or place[0] not in ("points", "causes")
+        # One point less, no causes and no remarks are a valid file.
+        needed = place == ("points",) or place[0] not in ("points", "causes", "remarks")
         if way == 0 and isinstance(inner, dict) and needed:
             del inner[name]
         elif way == 1 and isinstance(inner, dict):

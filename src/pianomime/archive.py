@@ -121,8 +121,10 @@ def _read(
         members = {each.filename.removesuffix(".npy"): each for each in archive.infolist()}
         check_names([each.removesuffix(".npy") for each in archive.namelist()], schema, more)
         for member in members.values():
-            # A damaged name is found by its copy; what it should be may be optional.
+            # A damaged name is found by its copy: the array that it should be may be optional.
             archive.open(member).close()
+            if member.comment:  # which damage has made of the names of the next arrays
+                raise InputError("its list of arrays is damaged")
         for name in [name for name in schema if name in members]:
             with archive.open(members[name]) as file:
                 dtype, shape, first = _layout(file)
