@@ -31,6 +31,13 @@ _MAX_GEOMS = 1000
 _VIDEO_OVERSIZE = 1.5
 _PICTURE_OVERSIZE = 2.0
 _SILENCED = ("disable", "disabled", "off", "false", "0")
+_NEEDS = {
+    "cgl": "a screen",
+    "egl": "on Debian or Ubuntu `apt-get install libegl1 libgl1`",
+    "glfw": "a screen, and on Linux X11",
+    "osmesa": "on Debian or Ubuntu `apt-get install libosmesa6`",
+}
+"""What each backend of `mujoco` needs."""
 _SHRINKING = av.video.reformatter.Interpolation.AREA
 _PROBE = """
 import importlib, signal, sys, mujoco
@@ -271,7 +278,8 @@ def _backend() -> str:
             return backend
     if chosen:
         raise RenderUnavailable(
-            f"no video: MUJOCO_GL={wanted} does not work here; unset it, or install what it needs"
+            f"no video: MUJOCO_GL={wanted} does not work here; unset it, or give it what it needs: "
+            f"{_NEEDS[wanted]}"
         )
     raise RenderUnavailable(_advice())
 
