@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import KEYS, LOWEST_PITCH
 from pianomime.music import Score
+from pianomime.songs.find import find_songs
 
-SUFFIXES = (".mid", ".midi", ".kar", ".rmi")
 PEDAL = 64
 SAME = 0.002
 """[s] Times that differ by less are the same: symusic's are float32."""
@@ -130,12 +130,7 @@ def main() -> None:
     )
     parser.add_argument("folders", nargs="+", type=Path)
     options = parser.parse_args()
-    files = sorted(
-        file
-        for folder in options.folders
-        for file in folder.rglob("*")
-        if file.suffix.lower() in SUFFIXES
-    )
+    files = find_songs(options.folders)
     counts: Counter[str] = Counter()
     for file in files:
         ours, one, other = (

@@ -7,6 +7,7 @@ whole, later, finds what is damaged.
 from __future__ import annotations
 
 import tempfile
+import warnings
 import zipfile
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
@@ -69,7 +70,10 @@ def need_songs(folders: Sequence[Path], least: int = 1) -> None:
     """
     if not folders:
         raise InputError("FOLDER is missing: name folders of MIDI files")
-    number = len(find_songs(folders))
+    with warnings.catch_warnings():
+        # What is passed over is told when they are read.
+        warnings.simplefilter("ignore")
+        number = len(find_songs(folders))
     if number < least:
         raise InputError(
             f"{least} songs at least are needed, some of them for validation; there are {number}"

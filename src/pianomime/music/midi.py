@@ -25,6 +25,7 @@ from pianomime.music.midi_events import (
     MidiFormatError,
     read_events,
 )
+from pianomime.music.other_kinds import advice
 from pianomime.music.score import MAX_SECONDS, Score, ScoreError
 from pianomime.shown import title_of
 
@@ -49,7 +50,8 @@ def read_midi(path: Path) -> Score:
     try:
         file = read_events(_content(path))
     except MidiFormatError as error:
-        raise ScoreError(f"{path} {error}") from None
+        instead = advice(path)
+        raise ScoreError(f"{path} {error}{instead and f'; {instead}'}") from None
     counts = Counter(file.repairs)
     if file.sequential:
         counts["patterns, one after the other"] = len(file.tracks)
