@@ -31,10 +31,13 @@ class Diagnose:
     """
 
     performances: Annotated[
-        tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="PERFORMANCE.npz...")
+        tyro.conf.Positional[tuple[Path, ...]],
+        tyro.conf.arg(metavar="PERFORMANCE.npz...", help_behavior_hint="(required)"),
     ]
     """Files performance.npz that `pianomime play` has written."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
+    ] = None
     """Folder for the diagnosis; by default that of the first performance."""
 
     def run(self) -> None:

@@ -21,6 +21,12 @@ class Evaluate:
     Settings of the player are options too, such as --planner.beam 200: `pianomime players
     zero-shot` lists those of the zero-shot player.
 
+    Players:
+      planned: zero-shot, zero-shot-ik, fingers
+      learned: two-stage-diff, two-stage-diff-no-sdf, two-stage-diff-res,
+        two-stage-bet, two-stage-mse, one-stage-diff, bc-mse, multi-task-sac
+      `pianomime players` says what each is and needs.
+
     Examples:
       pianomime evaluate FOLDER
       pianomime evaluate FOLDER more/SONG.mid fur-elise -o out/all --jobs 4
@@ -28,7 +34,10 @@ class Evaluate:
       pianomime evaluate FOLDER --player my_module:make_player --planner.beam 200
     """
 
-    paths: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="PATH...")]
+    paths: Annotated[
+        tyro.conf.Positional[tuple[str, ...]],
+        tyro.conf.arg(metavar="PATH...", help_behavior_hint="(required)"),
+    ]
     """MIDI files, folders of them, or names of bundled songs."""
     player: Annotated[str, tyro.conf.arg(metavar="PLAYER")] = "zero-shot"
     """Who plays: a name (see `pianomime players`), PACKAGE.MODULE:FACTORY, the folder of an expert
@@ -41,12 +50,14 @@ class Evaluate:
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """How much of each song to play at most, from its first note [s]."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
     """Songs played at the same time; one a core if not given. They slow each other down: compare
     real time only between runs with the same N."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Seed of everything that is random."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
+    ] = None
     """Folder for the results; out/evaluate-PLAYER-EFFORT if not given."""
 
     def run(self) -> None:

@@ -25,9 +25,11 @@ class ImportDemos:
 
     source: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="SOURCE")]
     """The published data."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
+    ] = None
     """Folder for the demonstrations; out/demos-SOURCE if not given."""
-    clips: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    clips: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
     """Import only the first N."""
 
     def run(self) -> None:

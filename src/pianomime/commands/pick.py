@@ -23,7 +23,9 @@ class Pick:
 
     video: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="VIDEO")]
     """A video of a keyboard from above."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="POINTS.json")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="POINTS.json", help_behavior_hint="")
+    ] = None
     """File for the points; by default out/VIDEO-points.json."""
     port: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Port of the web page; 0 for any free one."""

@@ -28,6 +28,14 @@ class Play:
     Settings of the player are options too, such as --planner.beam 200: `pianomime players
     zero-shot` lists those of the zero-shot player.
 
+    Players:
+      planned: zero-shot, zero-shot-ik, fingers
+      learned: two-stage-diff, two-stage-diff-no-sdf, two-stage-diff-res,
+        two-stage-bet, two-stage-mse, one-stage-diff, bc-mse, multi-task-sac
+      of DEMO.npz: demonstration, demonstration-ik
+      of one song: the folder of an expert
+      `pianomime players` says what each is and needs.
+
     Examples:
       pianomime play ode-to-joy
       pianomime play SONG.mid -o out/song --no-video
@@ -42,9 +50,11 @@ class Play:
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
     """A MIDI file, a demonstration (see `pianomime retarget`), or the name of a bundled song (see
     `pianomime songs`)."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
+    ] = None
     """Folder for the report; out/NAME if not given."""
-    player: Annotated[str | None, tyro.conf.arg(metavar="PLAYER")] = None
+    player: Annotated[str | None, tyro.conf.arg(metavar="PLAYER", help_behavior_hint="")] = None
     """Who plays: a name (see `pianomime players`), PACKAGE.MODULE:FACTORY, the folder of an expert
     (see `pianomime train-expert`) or of weights (see `pianomime train`). zero-shot if not given,
     and for demonstrations, demonstration."""

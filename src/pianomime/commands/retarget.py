@@ -28,17 +28,21 @@ class Retarget:
 
     video: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="VIDEO")]
     """A video of a keyboard from above."""
-    midi: Annotated[Path | None, tyro.conf.arg(metavar="SONG.mid")] = None
+    midi: Annotated[Path | None, tyro.conf.arg(metavar="SONG.mid", help_behavior_hint="")] = None
     """MIDI file of what is played; by default the notes are read from keys that light up."""
-    points: Annotated[Path | None, tyro.conf.arg(metavar="POINTS.json")] = None
+    points: Annotated[Path | None, tyro.conf.arg(metavar="POINTS.json", help_behavior_hint="")] = (
+        None
+    )
     """Points of the keyboard from `pianomime pick`; by default it is found automatically."""
-    offset: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
+    offset: Annotated[float | None, tyro.conf.arg(metavar="S", help_behavior_hint="")] = None
     """When the MIDI file begins in the video [s], negative if before it; by default estimated."""
-    hand_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    hand_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """MediaPipe's hand_landmarker.task; by default downloaded once."""
     align: Literal["steady", "paper"] = "steady"
     """How fingertips are moved onto keys: smoothly, or as in the paper's appendix A, step 3."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="DEMO.npz")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="DEMO.npz", help_behavior_hint="")
+    ] = None
     """File for the demonstration; by default out/VIDEO.npz."""
     overlay: bool = True
     """Write DEMO-seen.mp4."""

@@ -45,14 +45,16 @@ class Train:
 
     policy: Annotated[tyro.conf.Positional[PolicyName], tyro.conf.arg(metavar="POLICY")]
     """Name of the policy, see above."""
-    demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA")] = None
+    demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="DATA", help_behavior_hint="")] = (
+        None
+    )
     """For high levels, instead of --experts: a folder of demonstrations, or an .npz file of
     PianoMime's published ones."""
     experts: Annotated[
         tuple[Path, ...], tyro.conf.arg(metavar="DATA...", help_behavior_hint="")
     ] = ()
     """Data sets made by `pianomime collect-dagger` or `pianomime collect`."""
-    goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")] = None
     """Folder of the goal encoder; OUT/goal if not given."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
     """Folder for the results, shared by all policies."""

@@ -38,7 +38,9 @@ class TrainExpert:
     preset: PresetName = "paper"
     """The paper's residual policy, or the trajectory search, which plays best; the settings below
     change it."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="RUN")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="RUN", help_behavior_hint="")
+    ] = None
     """Folder of the run; out/expert-SONG-PRESET if not given."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """Longest excerpt, from the first note that sounds at START or after it [s]."""

@@ -37,16 +37,18 @@ class TrainExperts:
     preset: PresetName = "paper"
     """The paper's residual policy, or the trajectory search, which plays best; the settings below
     change it."""
-    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = None
+    out: Annotated[
+        Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
+    ] = None
     """Folder for the results; out/experts-FOLDER-PRESET if not given."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """Longest excerpt of each song [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in each song to begin [s]."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
     """Songs that are trained at the same time; one for each core if not given. A Ray cluster
     decides by itself."""
-    ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS", help_behavior_hint="")] = None
     """Address of a Ray cluster to train on, all of whose nodes see FOLDER and OUT; `auto` for the
     cluster that this machine is part of, `local` for a new one on this machine."""
     config: Annotated[ExpertConfig, tyro.conf.arg(name="")] = field(default_factory=ExpertConfig)

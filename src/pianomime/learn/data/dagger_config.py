@@ -20,9 +20,13 @@ class DaggerConfig:
     random share of it. Wrists and forearms have less, so that fingertips move about as far."""
     noise_correlation: float = 0.8
     """Correlation of the noise from one frame to the next."""
-    rollout_policy: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    rollout_policy: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = (
+        None
+    )
     """Low-level policy (.onnx) whose controls are played; the expert's own if not given."""
-    fingertip_policy: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    fingertip_policy: Annotated[
+        Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")
+    ] = None
     """High-level policy (.onnx) whose fingertips are followed; the human's if not given."""
     max_demonstrations: int = 0
     """Number of demonstrations to play, evenly spread over all; 0 for all."""
