@@ -49,7 +49,7 @@ ALLOWED = {
     # Times that have nothing to do with frames [s].
     ("music/metrics.py", "ONSET_TOLERANCE = 0.05"),
     ("songs/notation.py", "RELEASE = 0.05"),
-    ("video/hands/model.py", "_TIMEOUT = 30.0"),
+    ("commands/progress.py", "_LINE_SECONDS = 30.0"),
     # Shares, probabilities and costs.
     ("evaluation/diagnose.py", "_TOUCHED = 0.05"),
     ("learn/envs/reward.py", "KEY_BOUND, KEY_MARGIN = 0.05"),
@@ -60,6 +60,13 @@ ALLOWED = {
     ("video/parallax.py", "_MOST_STRETCH = 0.05"),
     # Counts of other things: bits, steps, updates, frames, notes, landmarks, pictures a second.
     ("archive.py", "_BLOCK = 1 << 20"),
+    ("music/midi.py", "_MOST_BYTES = 32 << 20"),
+    ("music/midi.py", "_MOST_BYTES >> 20"),
+    ("video/hands/model.py", "_LARGEST = 64 << 20"),
+    # Addresses of a synthesizer, the quality of a film, a share of a second.
+    ("music/midi_channels.py", "part, 0x15, mode"),
+    ("mp4.py", "crf: int = 20"),
+    ("video/film/sound.py", "_JITTER = SAMPLE_RATE // 20"),
     ("learn/fingers/training.py", "_CHECKPOINT_UPDATES = 20"),
     ("policies/methods.py", "Sampler(20)"),
     ("video/film/film.py", "_USUAL_RATE = 30.0"),
