@@ -47,5 +47,5 @@ def take_settings(arguments: list[str]) -> tuple[list[str], dict[str, Any]]:
 def _value(text: str) -> Any:
     try:
         return json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):  # a word, or brackets without end
         return text

@@ -124,7 +124,7 @@ def _replace(config: Any, path: list[str], value: Any, name: str) -> Any:
 def _converted(value: Any, known: Any, name: str) -> Any:
     """A value as one of the kind that a field has."""
     if isinstance(value, str) and not isinstance(known, str):
-        with contextlib.suppress(ValueError):  # It is reported below as what it is.
+        with contextlib.suppress(ValueError, RecursionError):  # It is reported below as what it is.
             value = json.loads(value)
     kind = type(known)
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
