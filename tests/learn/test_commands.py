@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from pianomime.cli import main
+from pianomime.cli import COMMANDS, main
+from pianomime.installation import install_command
 from pianomime.learn.expert.expert_run import ExpertRun
+from pianomime.learn.imitation.config import POLICIES
 from pianomime.plan.demonstration import Demonstration
 
 QUICK = ["--total-steps", "200", "--search.variations", "4", "--search.rounds", "1"]
@@ -63,7 +65,7 @@ def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> 
     assert "paper, best" in fails(["train-expert", "demo.npz", "--preset", "worst"], capsys)
     assert "total-steps" in fails(["train-expert", "demo.npz", "--total-steps", "0"], capsys)
     assert "no such file" in fails(["train-expert", "nothing.mid"], capsys)
-    assert "No such file" in fails(["train-expert", "nothing.npz"], capsys)
+    assert "does not exist; `pianomime" in fails(["train-expert", "nothing.npz"], capsys)
     assert "a second" in fails(["train-expert", "demo.npz", "--seconds", "0.2"], capsys)
     Path("other").mkdir()
     assert "neither the folder of a run" in fails(["play", "demo.npz", "--player", "other"], capsys)
@@ -99,7 +101,7 @@ def test_without_the_extra_it_says_what_to_install() -> None:
             [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=False
         )
         assert done.returncode == 2
-        assert "pip install 'pianomime[train]'" in done.stderr
+        assert install_command("train") in done.stderr
         assert len(done.stderr.splitlines()) == 1
     helped = subprocess.run(
         [sys.executable, "-c", script, "train-expert", "--help"],
@@ -108,6 +110,106 @@ def test_without_the_extra_it_says_what_to_install() -> None:
         check=False,
     )
     assert "Examples:" in helped.stdout
+
+
+LEARNING = [
+    name for name in COMMANDS if name.startswith(("train", "collect")) or name == "import-demos"
+]
+
+
+@pytest.mark.parametrize("command", LEARNING)
+def test_help_tells_what_is_required(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main([command, "--help"])
+    assert stopped.value.code == 0
+    told = capsys.readouterr().out
+    assert "Examples:" in told
+    assert "(default: )" not in told
+    assert "(required)" in told
+
+
+def test_help_lists_the_policies(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["train", "--help"])
+    about = capsys.readouterr().out.partition("Examples:")[0].replace(",", " ")
+    assert set(POLICIES) <= set(about.split())
+
+
+MISSING: list[tuple[list[str], str]] = [
+    (["train", "high-diff"], "`pianomime collect-dagger` with --experts, or demonstrations"),
+    (["train", "low-diff"], "`pianomime collect-dagger` with --experts"),
+    (["train", "bc-mse", "--experts", "no.zarr"], "does not exist; `pianomime collect-dagger"),
+    (["train", "bc-mse", "--experts", "file"], "`pianomime collect-dagger"),
+    (["train", "high-diff", "--demonstrations", "no"], "does not exist; `pianomime import-d"),
+    (["train", "high-diff", "--demonstrations", "empty"], "`pianomime import-demos`"),
+    (["train", "high-diff", "--demonstrations", "file"], "`pianomime import-demos`"),
+    (["train", "low-mse", "--demonstrations", "demo.npz"], "`pianomime collect-dagger`"),
+    (
+        ["train", "high-diff", "--demonstrations", "demo.npz"],
+        "`pianomime train-goal MIDI_FOLDER -o out/generalist/goal`",
+    ),
+    (
+        ["train", "high-bet", "--demonstrations", "demo.npz", "--goal", "empty"],
+        "`pianomime train-goal MIDI_FOLDER -o empty`",
+    ),
+    (
+        ["train", "high-diff-no-sdf", "--demonstrations", "demo.npz", "-o", "file"],
+        "file: is a file",
+    ),
+    (["train-goal"], "FOLDER is missing"),
+    (["train-goal", "empty"], "no MIDI files"),
+    (["train-goal", "ode-to-joy"], "2 songs at least"),
+    (["train-goal", "ode-to-joy", "twinkle-twinkle", "-o", "file/goal"], "file: is a file"),
+    (["train-fingers", "ode-to-joy"], "9 songs at least"),
+    (["train-sac"], "FOLDER is missing"),
+    (["train-sac", "ode-to-joy", "-o", "file"], "file: is a file"),
+    (["train-expert", "no.npz"], "does not exist; `pianomime import-demos`"),
+    (["train-expert", "empty"], "`pianomime train-experts empty`"),
+    (["train-expert", "ode-to-joy", "-o", "file"], "file: is a file"),
+    (["train-experts", "no"], "`pianomime train-expert`"),
+    (["train-experts", "empty", "--jobs", "0"], "jobs must be 1 or more"),
+    (["collect"], "name run folders"),
+    (["collect", "no"], "does not exist; `pianomime train-expert`"),
+    (["collect", "empty"], "no run"),
+    (["collect", "demo.npz"], "needs --demonstrations"),
+    (["collect", "empty", "-o", "empty"], "something else than a data set"),
+    (["collect-dagger", "no.npz"], "does not exist; `pianomime import-demos`"),
+    (["collect-dagger", "demo.npz", "-o", "file"], "something else than a data set"),
+    (["collect-dagger", "demo.npz", "--rollout-policy", "no.onnx"], "no.onnx: does not exist"),
+    (["import-demos", "no"], "no: does not exist"),
+    (["import-demos", "file", "-o", "file"], "file: is a file"),
+]
+"""Commands that lack something, and a part of what they say."""
+
+
+def test_what_is_missing_is_told_in_one_line_before_anything_heavy_is_imported() -> None:
+    Path("file").write_text("text")
+    Path("empty").mkdir()
+    script = (
+        "import sys\n"
+        "from pianomime.cli import main\n"
+        "for line in sys.stdin:\n"
+        "    try:\n"
+        "        main(line.rstrip().split('|'))\n"
+        "    except SystemExit as stopped:\n"
+        "        print(f'{stopped.code}', file=sys.stderr)\n"
+        "print(*(name for name in ('torch', 'stable_baselines3', 'ray') if name in sys.modules))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        input="".join("|".join(arguments) + "\n" for arguments, _ in MISSING),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    told = done.stderr.splitlines()
+    assert len(told) == 2 * len(MISSING), done.stderr
+    for (arguments, message), line, code in zip(MISSING, told[::2], told[1::2], strict=True):
+        assert message in line, (arguments, line)
+        assert code == "2", (arguments, line)
+    assert done.stdout.strip() == ""
+    assert {path.name for path in Path().iterdir()} == {"demo.npz", "file", "empty"}
+    assert not any(Path("empty").iterdir())
 
 
 def test_torch_is_imported_only_to_learn() -> None:
