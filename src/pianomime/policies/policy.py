@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.installation import install_command
 from pianomime.policies.features import Observation, action_reference
 from pianomime.policies.horizon import CHUNK, MOST_DIFFUSION_STEPS
 from pianomime.policies.sampler import Sampler, ddim_sample

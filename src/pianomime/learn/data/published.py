@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from pianomime.archive import read_arrays
 from pianomime.errors import InputError
 from pianomime.installation import install_command
-from pianomime.installation import install_command
 from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan

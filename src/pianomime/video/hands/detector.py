@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.installation import install_command
-from pianomime.installation import install_command
 from pianomime.video.hands.sightings import Sighting
 
 _LANDMARKS = [0, 4, 8, 12, 16, 20]
