@@ -33,7 +33,7 @@ PROTOCOL = (
 def test_numbers_hold_what_was_agreed() -> None:
     score = made_up.score()
     row = summarize(made_up.performance(score))
-    assert set(row) == {*PROTOCOL, "notes", "dropped_notes", "blow_ups"}
+    assert set(row) == {*PROTOCOL, "notes", "dropped_notes", "blow_ups", "remarks"}
     assert row["frames"] == len(score.roll())
     assert row["dropped_notes"] == 1
     assert row["blow_ups"] == 1

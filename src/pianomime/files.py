@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
-import shutil
-import tempfile
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from pianomime.errors import InputError
+from pianomime.file_names import check_name
+from pianomime.staging import claim, hold
+
+_PATIENCE = 10.0
+"""[s] for another writer of the same file to be done."""
 
 
 @contextmanager
@@ -20,44 +22,22 @@ def atomic(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Yields a temporary path in the same folder, with the same suffix, because some writers choose a
     format by it. Leaving the block moves the file into place; any exception, Ctrl-C too, removes
-    it and leaves what was at `path` untouched.
+    it and leaves what was at `path` untouched. Of several writers each waits for the one before.
 
     Args:
         path: where the file should end up; its folder must exist.
 
     Raises:
         FileNotFoundError: the folder does not exist, or the block wrote nothing.
+        InputError: another process does not come to an end with the same file.
     """
     target = Path(path)
     # A temporary folder, not a temporary file name: the writer creates the file itself, with the
-    # permissions of the user's umask, and two writers cannot choose the same name.
-    with tempfile.TemporaryDirectory(prefix=f".{target.stem}-", dir=target.parent) as folder:
-        temporary = Path(folder, target.name)
+    # permissions of the user's umask.
+    with claim(target, _PATIENCE) as folder:
+        temporary = folder / target.name
         yield temporary
         os.replace(temporary, target)
-
-
-def leftovers(folder: Path, names: Iterable[str]) -> list[str]:
-    """Names of temporary folders that `atomic` left when its process was killed.
-
-    Args:
-        folder: where the files should have ended up.
-        names: names of the files.
-    """
-    ours = "|".join(re.escape(Path(name).stem) for name in names)
-    form = re.compile(rf"\.({ours})-\w+")
-    return [file.name for file in folder.iterdir() if form.fullmatch(file.name) and file.is_dir()]
-
-
-def sweep(folder: Path, names: Iterable[str]) -> None:
-    """Remove the temporary folders that `leftovers` finds.
-
-    Args:
-        folder: where the files should have ended up.
-        names: names of the files, which nobody may be writing now.
-    """
-    for name in leftovers(folder, names):
-        shutil.rmtree(folder / name, ignore_errors=True)
 
 
 def files_digest(files: Iterable[Path]) -> str:
@@ -73,53 +53,63 @@ def files_digest(files: Iterable[Path]) -> str:
 
 
 @contextmanager
-def staged(out: Path, ours: Collection[str]) -> Iterator[Path]:
+def staged(out: Path, ours: Collection[str], name: str | None = None) -> Iterator[Path]:
     """Collect files in a temporary folder, then put them in place together.
 
     Yields the temporary folder. Any exception in the block, Ctrl-C too, removes its files and
     leaves `out` as it was. Leaving the block moves them into `out`: in one step if `out` does not
     exist, else one by one, so that an interruption during the move leaves some of them in place.
+    Nobody else writes there meanwhile, and what killed processes left there is removed.
 
     Args:
         out: where the files should end up; created, with its parents, if it does not exist.
         ours: all names that a caller may write: files of these names in `out` that were not
             written this time are from an earlier run and are removed. No other file in `out` is
             touched.
+        name: of the one output in `out` that is written, if others may be written meanwhile.
 
     Raises:
-        InputError: `out` is not a folder, or cannot be written.
+        InputError: `out` is not a folder, cannot be written, or another process writes there.
     """
-    try:
-        mine = _folder_beside(out)
-    except OSError as error:
-        raise _cannot_be_written(out, error) from error
-    try:
-        # Not `mine` itself, which only the user may read: this one has the umask's permissions.
-        temporary = mine / "out"
-        temporary.mkdir()
-        yield temporary
+    for name_inside in ours:
+        check_name(out / name_inside)
+    check_name(out)
+    real = Path(os.path.realpath(out))
+    with ExitStack() as stack:
         try:
-            _move(temporary, out, ours)
+            stack.enter_context(_folders(real.parent if name is None else real, out))
+            temporary = stack.enter_context(hold(out if name is None else out / name))
         except OSError as error:
             raise _cannot_be_written(out, error) from error
-    finally:
-        shutil.rmtree(mine, ignore_errors=True)
+        yield temporary
+        try:
+            _move(temporary, real, ours)
+        except OSError as error:
+            raise _cannot_be_written(out, error) from error
 
 
-def _folder_beside(out: Path) -> Path:
-    """A new folder on the same file system as `out`, which may be a mount of its own."""
+@contextmanager
+def _folders(path: Path, out: Path) -> Iterator[None]:
+    """Make a folder and those that it is in; those that stay empty are removed again."""
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; a folder is needed")
-    home = out.absolute()
-    while not home.exists():
-        home = home.parent
-    if not home.is_dir():
-        raise InputError(f"{home}: is a file; a folder is needed")
-    return Path(tempfile.mkdtemp(prefix=".pianomime-", dir=home))
+    missing = []
+    while not path.exists():
+        missing.append(path)
+        path = path.parent
+    if not path.is_dir():
+        raise InputError(f"{path}: is a file; a folder is needed")
+    try:
+        for folder in reversed(missing):
+            folder.mkdir(exist_ok=True)
+        yield
+    finally:
+        for folder in missing:
+            with suppress(OSError):  # It holds something.
+                folder.rmdir()
 
 
 def _move(temporary: Path, out: Path, ours: Collection[str]) -> None:
-    out.parent.mkdir(parents=True, exist_ok=True)
     if not out.exists():
         temporary.rename(out)
         return

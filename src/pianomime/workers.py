@@ -4,7 +4,8 @@ The work is named as "package.module:function". The function is called once in t
 process with a setup, and returns what answers requests: that is where a player or a network is
 loaded. An exception costs one request, and so does a crash, after which the process is started
 again. The process ends when its input does, also in the middle of work, and so does not outlive the
-process that asked, however that ends.
+process that asked, however that ends; on Linux the kernel sees to it as well. One that is closed
+may clear away what it was writing.
 
 These are plain processes, rather than forks or children of `multiprocessing`, so that a script that
 starts some needs no `if __name__ == "__main__"`, and libraries with threads are safe.
@@ -17,19 +18,21 @@ import importlib
 import json
 import os
 import queue
+import signal
 import subprocess
 import sys
 import threading
 import traceback
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Collection, Generator, Iterable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any, TextIO, TypeVar
 
 from pianomime.errors import InputError
+from pianomime.shown import shown
+from pianomime.stop import Stopped, stoppable
 
 Row = dict[str, Any]
 """What became of a request; one that failed has an `error`."""
@@ -37,6 +40,11 @@ Answer = Callable[[Any], Row]
 """Does what a request asks for; both are what JSON can hold."""
 
 _Item = TypeVar("_Item")
+
+_GRACE = 2.0
+"""[s] for a process that is closed to clear away what it was writing."""
+_PR_SET_PDEATHSIG = 1
+"""Linux: have a signal sent to this process when the thread that started it ends."""
 
 
 def cores() -> int:
@@ -69,28 +77,44 @@ def work(
     workers = [Worker(function, setup) for _ in range(min(jobs, len(waiting)))]
     if not workers:
         return
-    idle, running = list(workers), dict[Future[Row], tuple[_Item, Worker]]()
-    # The threads only wait for the processes.
-    threads = ThreadPoolExecutor(len(workers))
+    rows: queue.SimpleQueue[tuple[Worker, _Item, Row | Exception]] = queue.SimpleQueue()
+
+    def ask(worker: Worker, item: _Item, asked: Any) -> None:
+        try:
+            rows.put((worker, item, worker.ask(asked)))
+        except Exception as error:  # For who waits, not for this thread.
+            rows.put((worker, item, error))
+
+    idle, running = list(workers), dict[Worker, threading.Thread]()
     done: list[tuple[_Item, Row]] = []
     try:
         while True:
             # Before rows are handed out, which may take a while.
             while idle and waiting:
-                item, worker = waiting.popleft(), idle.pop()
-                running[threads.submit(worker.ask, request(item))] = item, worker
+                worker, item = idle.pop(), waiting.popleft()
+                # It only waits for the process; the end of this one must not wait for it.
+                thread = threading.Thread(
+                    target=ask, args=(worker, item, request(item)), daemon=True
+                )
+                running[worker] = thread
+                thread.start()
             yield from done
             if not running:
                 return
-            done = []
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                item, worker = running.pop(future)
-                done.append((item, future.result()))
-                idle.append(worker)
+            worker, item, row = rows.get()
+            running.pop(worker).join()
+            if isinstance(row, Exception):
+                raise row
+            idle.append(worker)
+            done = [(item, row)]
     finally:
         for worker in workers:
+            worker.stop()
+        for worker in workers:
             worker.close()
-        threads.shutdown()
+        for thread in running.values():
+            if thread.ident is not None:
+                thread.join()
 
 
 class Worker:
@@ -133,17 +157,25 @@ class Worker:
                 self._process = self._start()
         return {"error": f"its process died (exit code {code})"}
 
-    def close(self) -> None:
-        """End the process for good, also in the middle of work."""
+    def stop(self) -> None:
+        """Ask the process to end, without waiting for it."""
         with self._lock:
             self._closed = True
-        self._process.kill()
-        self._process.wait()
+        self._process.terminate()
+
+    def close(self) -> None:
+        """End the process for good, also in the middle of work."""
+        self.stop()
+        try:
+            self._process.wait(_GRACE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
     def _start(self) -> subprocess.Popen[str]:
         process = subprocess.Popen(
             # Not -m alone, which would look for modules in the present folder first.
-            [sys.executable, "-P", "-m", "pianomime.workers", self._function],
+            [sys.executable, "-P", "-m", "pianomime.workers", self._function, _lasting_pid()],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             encoding="utf-8",
@@ -180,11 +212,32 @@ def answered(answer: Answer, request: Any) -> Row:
     try:
         return answer(request)
     except (InputError, OSError) as error:
-        return {"error": str(error)}
+        return {"error": shown(error)}
     except Exception as error:  # A bug of ours must not cost the other items either.
         where = traceback.extract_tb(error.__traceback__)[-1]
         reason = f"{type(error).__name__}: {error} ({Path(where.filename).name}:{where.lineno})"
-        return {"error": reason}
+        return {"error": shown(reason)}
+
+
+def _lasting_pid() -> str:
+    """The number of this process, where its present thread lasts as long as the process."""
+    lasts = threading.current_thread() is threading.main_thread()
+    return str(os.getpid()) if lasts else "0"
+
+
+def _end_with(parent: int) -> None:
+    """Have the kernel end this process with the one that started it, where it can.
+
+    Args:
+        parent: number of that process; 0 if it is a thread that may end before.
+    """
+    if parent and sys.platform == "linux":
+        import ctypes
+
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # It ended before that.
+            os._exit(0)
 
 
 def _release(process: subprocess.Popen[str]) -> None:
@@ -210,6 +263,9 @@ def _loaded(function: str, setup: Any) -> Answer:
 
 def main() -> None:
     """Answer until the input ends."""
+    # Ctrl-C is for the process that asked, also where this one has no session of its own.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _end_with(int(sys.argv[2]))
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def read() -> None:
@@ -224,6 +280,17 @@ def main() -> None:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     # What warnings tell, such as that the physics broke, is counted in the rows.
     warnings.simplefilter("ignore")
+    received: list[int] = []
+    with contextlib.suppress(Stopped), stoppable(received, last=True):
+        _answer_all(requests, answers, received)
+    # What was being written is cleared away. The end of the interpreter would take longer.
+    os._exit(128 + received[0])
+
+
+def _answer_all(
+    requests: queue.SimpleQueue[str], answers: TextIO, received: Collection[int]
+) -> None:
+    """Answer until a signal is received, also where that was turned into another error."""
     answer = _loaded(sys.argv[1], json.loads(requests.get()))
 
     def checked(request: Any) -> Row:
@@ -231,7 +298,7 @@ def main() -> None:
         json.dumps(row, allow_nan=False)
         return row
 
-    while True:
+    while not received:
         row = answered(checked, json.loads(requests.get()))
         print(json.dumps(row, allow_nan=False), file=answers, flush=True)
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
+
+from pianomime.shown import shown
 
 if TYPE_CHECKING:
     from pianomime.learn.data.episode import Episode
@@ -24,14 +27,19 @@ class Collect:
     Examples:
       pianomime collect out/experts-FOLDER-best -o experts.zarr
       pianomime collect RUN RUN -o experts.zarr
-      pianomime collect experts.npz --demonstrations demonstrations.npz -o experts.zarr
+      pianomime collect experts.npz --demonstrations demos.npz -o experts.zarr
     """
 
-    runs: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="RUN...")]
+    runs: Annotated[
+        tyro.conf.Positional[tuple[Path, ...]],
+        tyro.conf.arg(metavar="RUN...", help_behavior_hint="(required)"),
+    ]
     """Run folders of experts, folders of such, or .npz files of PianoMime's published experts."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/experts.zarr")
     """The data set; an existing one is replaced."""
-    demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    demonstrations: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = (
+        None
+    )
     """For published experts: the demonstrations that they were trained on, an .npz file."""
 
     def run(self) -> None:
@@ -44,30 +52,52 @@ class Collect:
         from pianomime.commands.extras import extra
         from pianomime.commands.progress import bars
 
+        self._check_needs()
         with extra("train"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.data.trajectories import write_trajectories
 
-            number = write_trajectories(self.out, self._episodes(progress))
-        print(f"saved {number} episodes: {self.out}")
+            with closing(self._episodes(progress)) as episodes:
+                number = write_trajectories(self.out, episodes)
+        print(f"saved {number} episodes: {shown(self.out)}")
 
-    def _episodes(self, progress: Progress) -> Iterator[Episode]:
+    def _check_needs(self) -> None:
+        from pianomime.commands.needs import (
+            need_demonstrations,
+            need_experts,
+            need_packages,
+            need_place_for_data_set,
+        )
         from pianomime.errors import InputError
+
+        if not self.runs:
+            raise InputError("no runs to collect: name run folders of experts")
+        need_packages("train")
+        need_place_for_data_set(self.out)
+        for path in self.runs:
+            if path.suffix != ".npz":
+                need_experts(path)
+            elif self.demonstrations is None:
+                raise InputError(f"{path}: needs --demonstrations, what it was trained on")
+            else:
+                need_demonstrations(path)
+                need_demonstrations(self.demonstrations)
+
+    def _episodes(self, progress: Progress) -> Generator[Episode, None, None]:
         from pianomime.learn.data.episode import play_episode
         from pianomime.learn.data.published import published_episodes
         from pianomime.learn.expert.expert_run import ExpertRun, find_expert_runs
 
-        if not self.runs:
-            raise InputError("no runs to collect")
         for path in self.runs:
             if path.suffix == ".npz":
-                if self.demonstrations is None:
-                    raise InputError(f"{path}: needs --demonstrations, what it was trained on")
+                assert self.demonstrations is not None
                 published = published_episodes(path, self.demonstrations)
                 for done, (episode, total) in enumerate(published, 1):
                     yield episode
                     progress(path.name, done, total)
                 continue
             found = find_expert_runs(path)
+            progress("playing", 0, len(found))
             for done, folder in enumerate(found, 1):
                 yield play_episode(ExpertRun.load(folder))
                 progress("playing", done, len(found))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from pianomime.learn.data.dagger_config import DaggerConfig
+from pianomime.shown import shown
 
 if TYPE_CHECKING:
     from pianomime.learn.data.episode import Episode
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class CollectDagger:
-    """Make a data set for imitation by DAgger, with the dynamic tracker as the expert.
+    r"""Make a data set for imitation by DAgger, with the dynamic tracker as the expert.
 
     Demonstrations are played with noise on the controls, and every state is labelled with the
     expert's control, so that policies also learn to recover. The expert itself plays, or a
@@ -29,17 +31,18 @@ class CollectDagger:
     Examples:
       pianomime collect-dagger demonstrations.npz -o dagger.zarr
       pianomime train high-diff --experts dagger.zarr
-      pianomime train low-diff --experts dagger.zarr -o first --goal out/generalist/goal
-      pianomime collect-dagger demonstrations.npz --rollout-policy first/low-diff.onnx \
-        --fingertip-policy out/generalist/high-diff.onnx -o more.zarr
+      pianomime train low-diff --experts dagger.zarr -o first --goal GOAL
+      pianomime collect-dagger demonstrations.npz -o more.zarr \
+        --rollout-policy first/low-diff.onnx \
+        --fingertip-policy out/generalist/high-diff.onnx
       pianomime train low-diff --experts dagger.zarr more.zarr
     """
 
     demonstrations: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DEMOS")]
-    """A folder of demonstrations, or an .npz file of PianoMime's published ones."""
+    """A demonstration (.npz), a folder of such, or an .npz file of PianoMime's published ones."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/dagger.zarr")
     """The data set; an existing one is replaced."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
     """Demonstrations played at the same time; one a core if not given."""
     config: Annotated[DaggerConfig, tyro.conf.arg(name="")] = field(default_factory=DaggerConfig)
     """Policies that play, and the noise."""
@@ -57,15 +60,34 @@ class CollectDagger:
 
         if self.jobs is not None:
             within("jobs", self.jobs, 1)
+        self._check_needs()
         f1: list[float] = []
         with extra("train"), bars() as progress:
+            progress("loading", 0, 0)
             from pianomime.learn.data.trajectories import write_trajectories
 
-            number = write_trajectories(self.out, self._episodes(progress, f1))
+            # Closed at once where the work is stopped, and with it the processes.
+            with closing(self._episodes(progress, f1)) as episodes:
+                number = write_trajectories(self.out, episodes)
         print(f"demonstrations played: {number}, at a mean F1 of {sum(f1) / number:.3f}")
-        print(f"saved: {self.out}")
+        print(f"saved: {shown(self.out)}")
 
-    def _episodes(self, progress: Progress, f1: list[float]) -> Iterator[Episode]:
+    def _check_needs(self) -> None:
+        from pianomime.commands.needs import (
+            need_demonstrations,
+            need_packages,
+            need_place_for_data_set,
+        )
+
+        need_packages("train")
+        need_demonstrations(self.demonstrations)
+        need_place_for_data_set(self.out)
+        if self.config.rollout_policy is not None or self.config.fingertip_policy is not None:
+            from pianomime.learn.data.dagger import check_policies
+
+            check_policies(self.config)
+
+    def _episodes(self, progress: Progress, f1: list[float]) -> Generator[Episode, None, None]:
         from pianomime.learn.data.dagger import collect_dagger
         from pianomime.learn.data.dataset import read_demonstrations
 
@@ -73,8 +95,9 @@ class CollectDagger:
         limit = self.config.max_demonstrations
         if limit:
             demonstrations = demonstrations[:: -(-len(demonstrations) // limit)]
-        episodes = collect_dagger(demonstrations, self.config, self.jobs)
-        for done, episode in enumerate(episodes, 1):
-            f1.append(episode.f1)
-            yield episode
-            progress("playing", done, len(demonstrations))
+        with closing(collect_dagger(demonstrations, self.config, self.jobs)) as episodes:
+            progress("playing", 0, len(demonstrations))
+            for done, episode in enumerate(episodes, 1):
+                f1.append(episode.f1)
+                yield episode
+                progress("playing", done, len(demonstrations))

@@ -28,7 +28,6 @@ from pianomime.learn.expert.expert_worker import expert_request
 from pianomime.learn.expert.ppo import make_model
 from pianomime.learn.runs import safetensors_file
 from pianomime.learn.runs.config_json import from_json, to_json
-from pianomime.learn.runs.lock import run_lock
 from pianomime.plan import FingertipPlan
 from pianomime.plan.demonstration import Demonstration
 from pianomime.world import WorldBatch
@@ -144,9 +143,9 @@ def test_a_run_that_was_killed_at_its_beginning_begins_anew(
     for name in left:
         (out / name).write_bytes((whole / name).read_bytes())
     # What a kill in the middle of writing a file leaves of it.
-    for name in (".demonstration-a1b2c3", ".run-x_y_z0"):
-        (out / name).mkdir()
-        (out / name / "half").write_bytes(b"cut")
+    half = out / ".pianomime-0123456789abcdef" / "out"
+    half.mkdir(parents=True)
+    (half / "run.json").write_bytes(b"cut")
     again = train_expert(demo, out, small_search)
     assert again.curve() == ExpertRun.load(whole).curve()
     assert not [name for name in os.listdir(out) if name.startswith(".")]
@@ -158,20 +157,10 @@ def test_a_run_that_was_killed_at_its_beginning_begins_anew(
         train_expert(demo, tmp_path / "theirs", small_search)
     assert (tmp_path / "theirs" / "demonstration.npz").read_bytes() == before
     # Also when it goes on; what is not ours stays.
-    for name in (".state-0000", ".mine"):
+    for name in (".pianomime-0123456789abcdef", ".mine"):
         (out / name).mkdir()
     train_expert(demo, out, small_search)
     assert [name for name in os.listdir(out) if name.startswith(".")] == [".mine"]
-
-
-def test_one_process_at_a_time_trains_in_a_folder(tmp_path: Path) -> None:
-    with run_lock(tmp_path / "run"):
-        with pytest.raises(InputError, match="another process"), run_lock(tmp_path / "run", 0.0):
-            pass
-        with run_lock(tmp_path / "other", 0.0):
-            pass
-    with run_lock(tmp_path / "run", 0.0):
-        pass
 
 
 def test_a_search_has_the_threads_that_it_is_given(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 import os
 import signal
@@ -22,10 +21,10 @@ from toy_training import CONFIG, error, loss, network, sample_batch, stop_at, tr
 
 from pianomime.errors import InputError, TrainingDiverged
 from pianomime.learn.runs import run as run_module
-from pianomime.learn.runs.lock import run_lock
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.trainer import learning_rate, load_weights
 from pianomime.learn.runs.trainer_config import TrainerConfig
+from pianomime.staging import claim
 
 
 def bits(folder: Path) -> dict[str, bytes]:
@@ -248,8 +247,8 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with pytest.raises(InputError, match=r"state\.safetensors: damaged"):
         train(out, config)
     (out / "state.safetensors").write_bytes(whole)
-    monkeypatch.setattr(run_module, "run_lock", functools.partial(run_lock, patience=0.0))
-    with run_lock(out), pytest.raises(InputError, match="another process"):
+    monkeypatch.setattr(run_module, "_PATIENCE", 0.0)
+    with claim(out), pytest.raises(InputError, match="another process"):
         train(out, config)
     train(out, config)
     with pytest.raises(InputError, match="another network"):
@@ -281,7 +280,7 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ({"steps": 0}, "trainer.steps must be 1 or more"),
         ({"batch": 0}, "trainer.batch must be 1 or more"),
         ({"learning_rate": float("nan")}, "trainer.learning-rate must be more than 0"),
-        ({"warmup": 300}, "trainer.warmup must be 0 to 299"),
+        ({"warmup": -1}, "trainer.warmup must be 0 or more"),
         ({"ema_power": 0.0}, "trainer.ema-power must be more than 0"),
         ({"seed": -1}, "trainer.seed must be 0 or more"),
     ],
@@ -289,6 +288,13 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_settings_that_make_no_sense(fields: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         change(**fields)
+
+
+def test_a_short_training_has_a_short_warm_up() -> None:
+    assert change(steps=100, warmup=500).warmup == 10
+    assert change(steps=1, warmup=500).warmup == 0
+    # What fits stays as it was asked for.
+    assert change(steps=501, warmup=500).warmup == 500
 
 
 def test_tensorboard_shows_each_step_once(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 from pianomime.errors import InputError
+from pianomime.file_names import file_names
 from pianomime.files import atomic
 from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.learn.expert.config import ExpertConfig
@@ -14,9 +15,10 @@ from pianomime.learn.expert.expert_worker import EXPERT_WORKER, expert_request
 from pianomime.learn.expert.f1_chart import draw_f1_chart
 from pianomime.learn.runs.run import is_run
 from pianomime.progress import Progress, no_progress
+from pianomime.shown import markdown_cell
+from pianomime.songs.find import MIDI_SUFFIXES, files_below
+from pianomime.staging import hold
 from pianomime.workers import Row, cores, work
-
-_SUFFIXES = (".npz", ".mid", ".midi")
 
 
 def train_experts(
@@ -62,29 +64,30 @@ def train_experts(
         name: expert_request(song.resolve(), out.resolve() / name, config, start, seconds)
         for name, song in songs.items()
     }
-    rows: dict[str, Row] = {}
+    with hold(out):
+        rows: dict[str, Row] = {}
 
-    def report() -> None:
-        f1 = [row["f1"] for row in rows.values() if "error" not in row]
-        remark = f"mean F1 {sum(f1) / len(f1):.3f}" if f1 else ""
-        progress("songs", len(rows), len(songs), remark)
+        def report() -> None:
+            f1 = [row["f1"] for row in rows.values() if "error" not in row]
+            remark = f"mean F1 {sum(f1) / len(f1):.3f}" if f1 else ""
+            progress("songs", len(rows), len(songs), remark)
 
-    report()
-    if ray is None:
-        trained = work(EXPERT_WORKER, requests, jobs or cores(), request=requests.__getitem__)
-    else:
-        from pianomime.learn.expert.ray_cluster import on_cluster
+        report()
+        if ray is None:
+            trained = work(EXPERT_WORKER, requests, jobs or cores(), request=requests.__getitem__)
+        else:
+            from pianomime.learn.expert.ray_cluster import on_cluster
 
-        trained = on_cluster(requests, ray)
-    with closing(trained):
-        for name, row in trained:
-            rows[name] = {"song": name, **row}
-            report()
-    ordered = [rows[name] for name in songs]
-    _write(out / "experts.json", json.dumps(ordered, indent=1) + "\n")
-    _write(out / "experts.md", experts_table(ordered))
-    draw_f1_chart(ordered, out / "experts.png")
-    return ordered
+            trained = on_cluster(requests, ray)
+        with closing(trained):
+            for name, row in trained:
+                rows[name] = {"song": name, **row}
+                report()
+        ordered = [rows[name] for name in songs]
+        _write(out / "experts.json", json.dumps(ordered, indent=1) + "\n")
+        _write(out / "experts.md", experts_table(ordered))
+        draw_f1_chart(ordered, out / "experts.png")
+        return ordered
 
 
 def find_experts_songs(folder: Path, out: Path | None = None) -> dict[str, Path]:
@@ -104,31 +107,25 @@ def find_experts_songs(folder: Path, out: Path | None = None) -> dict[str, Path]
     results = None if out is None else out.resolve()
     if results is not None and not results.is_relative_to(folder.resolve()):
         results = None  # Also where the songs are a folder among the results.
-    files = sorted(
+    kind = "demonstrations or MIDI files"
+    files = [
         file
-        for file in folder.rglob("*")
-        if file.suffix.lower() in _SUFFIXES
-        and not is_run(file.parent)
+        for file in files_below(folder, (".npz", *MIDI_SUFFIXES), kind)
+        if not is_run(file.parent)
         and not (results is not None and file.resolve().is_relative_to(results))
-    )
+    ]
     if not files:
-        raise InputError(f"{folder}: no demonstrations or MIDI files in this folder")
-    names = ["-".join(file.relative_to(folder).with_suffix("").parts) for file in files]
-    doubled = {name for name in names if names.count(name) > 1}
-    return {
-        f"{name}{file.suffix}" if name in doubled else name: file
-        for name, file in zip(names, files, strict=True)
-    }
+        raise InputError(f"{folder}: no {kind} in this folder")
+    return dict(zip(file_names([file.relative_to(folder) for file in files]), files, strict=True))
 
 
 def experts_table(rows: list[Row]) -> str:
     """The rows as Markdown, and their mean."""
     lines = ["| song | F1 | precision | recall | steps |", "| --- | ---: | ---: | ---: | ---: |"]
     for row in rows:
-        song = str(row["song"]).replace("|", "\\|")
+        song = markdown_cell(row["song"])
         if "error" in row:
-            error = str(row["error"]).replace("|", "\\|")
-            lines.append(f"| {song} | failed: {error} | | | |")
+            lines.append(f"| {song} | failed: {markdown_cell(row['error'])} | | | |")
         else:
             cells = " | ".join(f"{row[name]:.3f}" for name in ("f1", "precision", "recall"))
             lines.append(f"| {song} | {cells} | {row['steps']} |")
