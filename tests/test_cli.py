@@ -214,9 +214,19 @@ def test_an_unknown_command_is_refused_with_a_list(capsys: pytest.CaptureFixture
     assert "play, evaluate" in fails(["perform"], capsys)
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is another thing on Windows")
-@pytest.mark.parametrize("command", ["play", "evaluate"])
-def test_ctrl_c_ends_with_130_and_leaves_nothing_half_done(command: str, tmp_path: Path) -> None:
+@pytest.mark.skipif(os.name == "nt", reason="signals are another thing on Windows")
+@pytest.mark.parametrize(
+    ("command", "number"),
+    [
+        ("play", signal.SIGINT),
+        ("play", signal.SIGTERM),
+        ("evaluate", signal.SIGINT),
+        ("evaluate", signal.SIGHUP),
+    ],
+)
+def test_a_signal_stops_in_one_line_and_leaves_nothing_half_done(
+    command: str, number: int, tmp_path: Path
+) -> None:
     out = tmp_path / "out"
     process = subprocess.Popen(
         [sys.executable, "-m", "pianomime", command, "ode-to-joy", "-o", str(out)],
@@ -232,9 +242,10 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing_half_done(command: str, tmp_pat
         assert process.poll() is None, process.stderr and process.stderr.read()
         assert time.monotonic() < began + 60
         time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, errors = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert errors.splitlines() == ["pianomime: stopped"]
+    assert process.returncode == 128 + number
+    goes_on = "; the same command goes on where it was" if command == "evaluate" else ""
+    assert errors.splitlines() == [f"pianomime: stopped{goes_on}"]
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
     assert not any(tmp_path.glob(".pianomime-*"))

@@ -1,8 +1,9 @@
 """The front door: finds the command, parses its typed config, runs it.
 
 Nothing heavy is imported before the command is known and its arguments are right. An error in
-what the user gave is one line on stderr and exit code 2; Ctrl-C is exit code 130. Where nobody
-reads on, as in `pianomime songs | head -1`, it ends with 141, as if by SIGPIPE, and says nothing.
+what the user gave is one line on stderr and exit code 2. Signals that stop it clear away what was
+half done, and give 128 and their number: 130 for Ctrl-C, 143 for SIGTERM. Where nobody reads on, as
+in `pianomime songs | head -1`, it ends with 141, as if by SIGPIPE, and says nothing.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import inspect
 import io
 import os
 import re
+import signal
 import sys
 import typing
 import warnings
@@ -21,6 +23,7 @@ from typing import Any, NamedTuple, NoReturn, Protocol
 
 from pianomime import __version__
 from pianomime.errors import InputError, WorkFailed, unknown_name
+from pianomime.stop import stoppable
 
 
 class Runnable(Protocol):
@@ -36,16 +39,26 @@ class Runnable(Protocol):
 
 
 class Command(NamedTuple):
-    """Where a command's config dataclass is, which must be cheap to import."""
+    """Where a command's config dataclass is, which must be cheap to import.
+
+    Attributes:
+        module: where the dataclass is.
+        config: its name.
+        summary: what the command does, in a few words.
+        goes_on: whether the same command goes on where it was stopped.
+    """
 
     module: str
     config: str
     summary: str
+    goes_on: bool = False
 
 
 COMMANDS = {
     "play": Command("pianomime.commands.play", "Play", "play a song and report on it"),
-    "evaluate": Command("pianomime.commands.evaluate", "Evaluate", "play and score many songs"),
+    "evaluate": Command(
+        "pianomime.commands.evaluate", "Evaluate", "play and score many songs", goes_on=True
+    ),
     "retarget": Command(
         "pianomime.commands.retarget", "Retarget", "make a demonstration of a video"
     ),
@@ -54,24 +67,35 @@ COMMANDS = {
         "pianomime.commands.import_demos", "ImportDemos", "read the paper's demonstrations"
     ),
     "train-expert": Command(
-        "pianomime.commands.train_expert", "TrainExpert", "train an expert of one song"
+        "pianomime.commands.train_expert",
+        "TrainExpert",
+        "train an expert of one song",
+        goes_on=True,
     ),
     "train-experts": Command(
-        "pianomime.commands.train_experts", "TrainExperts", "train experts of many songs"
+        "pianomime.commands.train_experts",
+        "TrainExperts",
+        "train experts of many songs",
+        goes_on=True,
     ),
     "collect": Command("pianomime.commands.collect", "Collect", "make a data set of experts"),
     "collect-dagger": Command(
         "pianomime.commands.collect_dagger", "CollectDagger", "make a data set by DAgger"
     ),
     "train-goal": Command(
-        "pianomime.commands.train_goal", "TrainGoal", "train the goal autoencoder"
+        "pianomime.commands.train_goal", "TrainGoal", "train the goal autoencoder", goes_on=True
     ),
-    "train": Command("pianomime.commands.train", "Train", "train a policy that plays every song"),
+    "train": Command(
+        "pianomime.commands.train", "Train", "train a policy that plays every song", goes_on=True
+    ),
     "train-fingers": Command(
-        "pianomime.commands.train_fingers", "TrainFingers", "train the finger residual policy"
+        "pianomime.commands.train_fingers",
+        "TrainFingers",
+        "train the finger residual policy",
+        goes_on=True,
     ),
     "train-sac": Command(
-        "pianomime.commands.train_sac", "TrainSac", "train multi-task SAC, a baseline"
+        "pianomime.commands.train_sac", "TrainSac", "train multi-task SAC, a baseline", goes_on=True
     ),
     "diagnose": Command(
         "pianomime.commands.diagnose", "Diagnose", "find why notes were missed or wrong"
@@ -122,27 +146,45 @@ def main(arguments: list[str] | None = None) -> None:
         arguments: what follows `pianomime`; None for those of this process.
 
     Raises:
-        SystemExit: with code 2 for bad input, 1 for work that failed, 130 for Ctrl-C, 141 when
-            nobody reads what it prints, 0 after `--help` or `--version`.
+        SystemExit: with code 2 for bad input, 1 for work that failed, 130 for Ctrl-C, 143 for
+            SIGTERM, 129 for SIGHUP, 141 when nobody reads what it prints, 0 after `--help` or
+            `--version`.
     """
+    given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    received: list[int] = []
     try:
-        with warnings.catch_warnings():
+        with stoppable(received, last=arguments is None), warnings.catch_warnings():
             # A user has no use for the line of our source that a warning points at.
             warnings.showwarning = _warn
-            _run((sys.argv[1:] if arguments is None else arguments) or ["--help"])
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        print("pianomime: stopped", file=sys.stderr)
-        sys.exit(130)
-    except InputError as error:
-        _fail(error)
-    except WorkFailed as error:
-        _fail(error, 1)
-    except BrokenPipeError:
+            _run(given)
+            sys.stdout.flush()
+    except BaseException as error:
+        # Also where it was turned into another error on its way here.
+        if received or isinstance(error, KeyboardInterrupt):
+            _stopped(given[0], received[0] if received else signal.SIGINT)
+        _failed(error)
+        raise
+
+
+def _stopped(name: str, number: int) -> NoReturn:
+    command = COMMANDS.get(ALIASES.get(name, name))
+    more = "; the same command goes on where it was" if command and command.goes_on else ""
+    with contextlib.suppress(OSError):  # The terminal may be gone.
+        print(f"pianomime: stopped{more}", file=sys.stderr, flush=True)
+    sys.exit(128 + number)
+
+
+def _failed(error: BaseException) -> None:
+    """End with a line, if this is an error that is no bug of ours."""
+    if isinstance(error, BrokenPipeError):
         # Python flushes once more when it ends: let it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(141)
-    except OSError as error:
+    if isinstance(error, InputError):
+        _fail(error)
+    if isinstance(error, WorkFailed):
+        _fail(error, 1)
+    if isinstance(error, OSError):
         _fail(_one_line(error))
 
 
@@ -162,7 +204,7 @@ def _run(arguments: list[str]) -> None:
 def _parse(name: str, arguments: list[str]) -> Runnable:
     import tyro
 
-    module, config, _ = COMMANDS[name]
+    module, config, *_ = COMMANDS[name]
     kind = getattr(importlib.import_module(module), config)
     settings: dict[str, Any] | None = None
     if "settings" in kind.__dataclass_fields__:
