@@ -15,14 +15,17 @@ import inspect
 import io
 import os
 import re
+import shutil
 import signal
 import sys
+import textwrap
 import typing
 import warnings
 from typing import Any, NamedTuple, NoReturn, Protocol
 
 from pianomime import __version__
 from pianomime.errors import InputError, WorkFailed, unknown_name
+from pianomime.shown import shown
 from pianomime.stop import stoppable
 
 
@@ -125,7 +128,7 @@ def _help() -> str:
 
 
 def _fail(message: object, code: int = 2) -> NoReturn:
-    print(f"pianomime: {message}", file=sys.stderr)
+    print(f"pianomime: {shown(message)}", file=sys.stderr)
     sys.exit(code)
 
 
@@ -136,7 +139,7 @@ def _one_line(error: OSError) -> str:
 
 
 def _warn(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"pianomime: warning: {message}", file=sys.stderr)
+    print(f"pianomime: warning: {shown(message)}", file=sys.stderr)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -152,6 +155,10 @@ def main(arguments: list[str] | None = None) -> None:
     """
     given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
     received: list[int] = []
+    for stream in (sys.stdout, sys.stderr):
+        # What the terminal cannot write is shown by its number, rather than ending the work.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         with stoppable(received, last=arguments is None), warnings.catch_warnings():
             # A user has no use for the line of our source that a warning points at.
@@ -213,19 +220,20 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
         arguments, settings = take_settings(arguments)
     # A command whose defaults depend on its arguments says what they are.
     known = {"default": kind.default(arguments)} if hasattr(kind, "default") else {}
-    said = io.StringIO()
+    said, asked = io.StringIO(), _Help(sys.stdout)
     try:
-        with contextlib.redirect_stderr(said):
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(asked):
             # Given in full: left to itself, tyro leaves out the examples.
             command: Runnable = tyro.cli(
                 kind,
                 prog=f"pianomime {name}",
-                description=inspect.cleandoc(kind.__doc__),
+                description=_paragraphs(inspect.cleandoc(kind.__doc__)),
                 args=arguments,
                 **known,
             )
     except SystemExit as stopped:
         if not stopped.code:
+            print(_wrapped(asked.getvalue()), end="")
             raise
         refused = _refused_by_config(stopped)
         if refused is not None:
@@ -235,6 +243,38 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
         return command
     with_settings: Runnable = dataclasses.replace(typing.cast(Any, command), settings=settings)
     return with_settings
+
+
+class _Help(io.StringIO):
+    """Takes the help of a command, in the letters and colours of the stream it is meant for."""
+
+    def __init__(self, stream: typing.TextIO) -> None:
+        super().__init__()
+        self._stream = stream
+
+    @property
+    def encoding(self) -> str:
+        return self._stream.encoding
+
+    def isatty(self) -> bool:
+        return self._stream.isatty()
+
+
+def _paragraphs(text: str) -> str:
+    """Text with each of its paragraphs in one line; lines that are indented stay as they are."""
+    return re.sub(r"(?<=\S)\n(?=\S)", " ", text)
+
+
+def _wrapped(text: str) -> str:
+    """Help whose paragraphs, each of which is one line, fit the width of the terminal."""
+    width = shutil.get_terminal_size().columns
+    lines = (
+        textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False)
+        if line[:1].isalpha()
+        else line
+        for line in text.splitlines()
+    )
+    return "\n".join(lines) + "\n"
 
 
 def _refused_by_config(stopped: BaseException) -> InputError | None:

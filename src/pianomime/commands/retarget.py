@@ -22,7 +22,8 @@ class Retarget:
 
     Examples:
       pianomime retarget VIDEO.mp4 --midi SONG.mid
-      pianomime retarget VIDEO.mp4 --midi SONG.mid --points POINTS.json --offset -3.2
+      pianomime retarget VIDEO.mp4 --midi SONG.mid --points POINTS.json
+      pianomime retarget VIDEO.mp4 --midi SONG.mid --offset -3.2
       pianomime retarget VIDEO.mp4 -o DEMO.npz --no-overlay
     """
 

@@ -33,13 +33,14 @@ class Train:
 
     Policies:
       from goals to fingertips: high-diff, high-diff-no-sdf, high-bet
-      from fingertips to controls: low-diff, low-diff-no-sdf, low-diff-res, low-bet, low-mse
+      from fingertips to controls: low-diff, low-diff-no-sdf, low-diff-res,
+        low-bet, low-mse
       from goals straight to controls: one-stage-diff, bc-mse
 
     Examples:
       pianomime train high-diff --experts dagger.zarr
       pianomime train low-diff --experts dagger.zarr
-      pianomime train low-diff-res --experts dagger.zarr more.zarr --trainer.steps 50000
+      pianomime train low-diff-res --experts A.zarr B.zarr --trainer.steps 50000
       pianomime train high-diff --size paper --demonstrations demos -o out/paper
     """
 

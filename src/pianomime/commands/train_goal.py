@@ -22,7 +22,7 @@ class TrainGoal:
 
     Examples:
       pianomime train-goal MIDI_FOLDER
-      pianomime train-goal FOLDER FOLDER -o out/generalist/goal --trainer.steps 20000
+      pianomime train-goal FOLDER FOLDER -o goal --trainer.steps 20000
     """
 
     folders: Annotated[

@@ -23,7 +23,7 @@ class TrainSac:
 
     Examples:
       pianomime train-sac MIDI_FOLDER
-      PIANOMIME_WEIGHTS=out/generalist pianomime play SONG.mid --player multi-task-sac
+      pianomime play SONG.mid --player out/generalist/multi-task-sac
     """
 
     folders: Annotated[

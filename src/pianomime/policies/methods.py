@@ -95,12 +95,16 @@ def policy_path(name: str, weights: str | Path | None = None) -> Path:
     """
     path = Path(weights or weights_folder()) / f"{name}.onnx"
     if not path.is_file():
-        command = _TRAINED_BY.get(name, f"train {name}")
         raise InputError(
-            f"{path} is not there: train it with `pianomime {command}`, or name a folder of "
+            f"{path} is not there: train it with `{train_command(name)}`, or name a folder of "
             f"weights in {WEIGHTS}"
         )
     return path
+
+
+def train_command(policy: str) -> str:
+    """The command that trains a policy, without the data that it needs."""
+    return f"pianomime {_TRAINED_BY.get(policy, f'train {policy}')}"
 
 
 def weight_files(method: str, weights: str | Path | None = None) -> list[Path]:
@@ -126,6 +130,19 @@ def weight_files(method: str, weights: str | Path | None = None) -> list[Path]:
     return [
         policy_path(name, bundled_weights() if name in lent else folder) for name in METHODS[method]
     ]
+
+
+def missing_policies(method: str, weights: str | Path | None = None) -> list[str]:
+    """The policies of a method that are neither in a folder nor lent by the program.
+
+    Args:
+        method: one of `METHODS`.
+        weights: folder of the weights; see `weights_folder`.
+    """
+    folder = Path(weights or weights_folder())
+    if _lent(method, folder):
+        return []
+    return [name for name in METHODS[method] if not _has(folder, name)]
 
 
 def methods_of(weights: Path) -> list[str]:
