@@ -154,7 +154,11 @@ def named(text: str) -> set[str]:
 @pytest.fixture(scope="module")
 def performance() -> pianomime.Performance:
     score = pianomime.Score(
-        np.array([40, 44]), np.array([0.0, 0.1]), np.array([0.2, 0.3]), np.array([64, 64])
+        np.array([40, 44]),
+        np.array([0.0, 0.1]),
+        np.array([0.2, 0.3]),
+        np.array([64, 64]),
+        remarks=("left out: 1",),
     )
     return pianomime.load_player("zero-shot", effort=0).play(score)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from typing import IO, Any, TypeVar
-from zipfile import ZIP_DEFLATED, ZipFile
+from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,15 @@ def read_archive(
     raise InputError(
         f"{path}: {kind} of version {found}; this program reads version {known}: make it anew"
     )
+
+
+def holds(path: str | os.PathLike[str], name: str) -> bool:
+    """Whether a file is one of arrays, among them one of a name; nothing else of it is read."""
+    try:
+        with ZipFile(path) as archive:
+            return f"{name}.npy" in archive.namelist()
+    except (OSError, BadZipFile):
+        return False
 
 
 def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, NDArray[Any]]) -> None:

@@ -59,6 +59,9 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "play": Command("pianomime.commands.play", "Play", "play a song and report on it"),
+    "report": Command(
+        "pianomime.commands.report", "Report", "see, hear and score a saved performance"
+    ),
     "evaluate": Command(
         "pianomime.commands.evaluate", "Evaluate", "play and score many songs", goes_on=True
     ),
@@ -233,7 +236,7 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
             )
     except SystemExit as stopped:
         if not stopped.code:
-            print(_wrapped(asked.getvalue()), end="")
+            print(_wrapped(asked.text()), end="")
             raise
         refused = _refused_by_config(stopped)
         if refused is not None:
@@ -245,19 +248,19 @@ def _parse(name: str, arguments: list[str]) -> Runnable:
     return with_settings
 
 
-class _Help(io.StringIO):
+class _Help(io.TextIOWrapper):
     """Takes the help of a command, in the letters and colours of the stream it is meant for."""
 
     def __init__(self, stream: typing.TextIO) -> None:
-        super().__init__()
-        self._stream = stream
-
-    @property
-    def encoding(self) -> str:
-        return self._stream.encoding
+        super().__init__(io.BytesIO(), stream.encoding, "backslashreplace")
+        self._colours = stream.isatty()
 
     def isatty(self) -> bool:
-        return self._stream.isatty()
+        return self._colours
+
+    def text(self) -> str:
+        self.seek(0)
+        return self.read()
 
 
 def _paragraphs(text: str) -> str:

@@ -15,7 +15,7 @@ import pytest
 from pianomime import evaluate, songs
 from pianomime.errors import InputError
 from pianomime.evaluation.evaluation import markdown
-from pianomime.evaluation.song_worker import SONG_WORKER
+from pianomime.evaluation.song_worker import SONG_WORKER, song_request
 from pianomime.policies.methods import WEIGHTS
 from pianomime.songs.find import find_songs
 from pianomime.workers import Worker
@@ -86,11 +86,11 @@ def test_finished_songs_are_not_played_again(folder: Path, tmp_path: Path) -> No
     (folder / "broken|one.mid").unlink()
     first = evaluate(folder, seconds=1.0, jobs=2, out=out)
     assert all("f1" in row for row in first["songs"]), first["songs"]
-    done = {file: file.stat().st_mtime_ns for file in (out / "songs").iterdir()}
+    done = {file: file.stat().st_mtime_ns for file in (out / "songs").glob("*.json")}
     assert len(done) == 5
 
     assert evaluate(folder, seconds=1.0, out=out) == first
-    assert {file: file.stat().st_mtime_ns for file in (out / "songs").iterdir()} == done
+    assert {file: file.stat().st_mtime_ns for file in (out / "songs").glob("*.json")} == done
 
     # Another length, another player or another song under the same name is another result.
     one = folder / f"{songs.names()[0]}.mid"
@@ -98,7 +98,7 @@ def test_finished_songs_are_not_played_again(folder: Path, tmp_path: Path) -> No
     evaluate(one, player="zero-shot-ik", seconds=1.0, jobs=1, out=out)
     one.write_bytes(songs.path(songs.names()[1]).read_bytes())
     evaluate(one, seconds=1.0, jobs=1, out=out)
-    assert len(list((out / "songs").iterdir())) == 5 + 3
+    assert len(list((out / "songs").glob("*.json"))) == 5 + 3
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_damaged_results_are_played_again_and_not_reported(tmp_path: Path, damag
     name = songs.names()[0]
     out = tmp_path / "out"
     first = evaluate(name, "zero-shot-ik", seconds=1.0, jobs=1, out=out)
-    (file,) = (out / "songs").iterdir()
+    (file,) = (out / "songs").glob("*.json")
     content = json.loads(file.read_text(encoding="utf-8"))
     changed = {
         "F1 edited": json.dumps({**content, "f1": 1.0}),
@@ -120,7 +120,7 @@ def test_damaged_results_are_played_again_and_not_reported(tmp_path: Path, damag
     }[damage]
     if damage == "another's":
         evaluate(name, "zero-shot-ik", seconds=1.5, jobs=1, out=tmp_path / "other")
-        (other,) = (tmp_path / "other" / "songs").iterdir()
+        (other,) = (tmp_path / "other" / "songs").glob("*.json")
         changed = other.read_text(encoding="utf-8")
     file.write_text(changed, encoding="utf-8")
     with pytest.warns(UserWarning, match=r"damaged.* the song is played again"):
@@ -156,10 +156,10 @@ def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
     setup = {"player": "zero-shot", "effort": 0, "seed": 0, "settings": {}, "seconds": 1.0}
     with Worker(SONG_WORKER, setup) as worker:
-        assert "f1" in worker.ask(str(song))
+        assert "f1" in worker.ask(song_request(song, None))
         os.kill(worker.pid, signal.SIGKILL)
-        assert worker.ask(str(song)) == {"error": "its process died (exit code -9)"}
-        assert "f1" in worker.ask(str(song))
+        assert worker.ask(song_request(song, None)) == {"error": "its process died (exit code -9)"}
+        assert "f1" in worker.ask(song_request(song, None))
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])

@@ -38,6 +38,7 @@ def test_a_row_holds_what_was_measured_rounded() -> None:
         "notes": 40,
         "dropped_notes": 1,
         "blow_ups": 3,
+        "remarks": [],
     }
     assert len({round(value, 3) == round(value, 6) for value in metrics.values()}) == 2
 

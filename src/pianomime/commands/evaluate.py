@@ -15,8 +15,10 @@ from pianomime.keyboard import EXCERPT_SECONDS
 class Evaluate:
     """Play and score many songs in parallel; print a Markdown table.
 
-    OUT then holds results.json and results.md. An evaluation that was interrupted resumes where it
-    was when it is started again with the same OUT. A song that fails is a line of the table.
+    OUT then holds results.json, results.md, and in songs/ the performance of each song, for
+    `pianomime report` and `pianomime diagnose`: some 1 MB for a minute of music. It may be deleted:
+    the song is not played again for it. An evaluation that was interrupted resumes where it was
+    when it is started again with the same OUT. A song that fails is a line of the table.
 
     Settings of the player are options too, such as --planner.beam 200: `pianomime players
     zero-shot` lists those of the zero-shot player.
@@ -31,6 +33,7 @@ class Evaluate:
       pianomime evaluate FOLDER
       pianomime evaluate FOLDER more/SONG.mid fur-elise -o out/all --jobs 4
       pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
+      pianomime evaluate DEMO.npz DEMOS/*.npz --player demonstration
       pianomime evaluate FOLDER --player my_module:make_player --planner.beam 200
     """
 
@@ -38,7 +41,9 @@ class Evaluate:
         tyro.conf.Positional[tuple[str, ...]],
         tyro.conf.arg(metavar="PATH...", help_behavior_hint="(required)"),
     ]
-    """MIDI files, folders of them, or names of bundled songs."""
+    """MIDI files, folders of them, demonstrations (see `pianomime retarget`), or names of bundled
+    songs. The players demonstration and demonstration-ik play demonstrations by their own plan, all
+    others their notes."""
     player: Annotated[str, tyro.conf.arg(metavar="PLAYER")] = "zero-shot"
     """Who plays: a name (see `pianomime players`), PACKAGE.MODULE:FACTORY, the folder of an expert
     (see `pianomime train-expert`) or of weights (see `pianomime train`)."""
@@ -70,7 +75,7 @@ class Evaluate:
         from pianomime.commands.progress import bars
         from pianomime.evaluation.evaluation import evaluate, markdown
         from pianomime.file_names import file_name
-        from pianomime.shown import shown
+        from pianomime.shown import command_word, shown
 
         seeded = f"-seed{self.seed}" if self.seed else ""
         # A player may be called by a path or a module.
@@ -89,3 +94,8 @@ class Evaluate:
             )
         print(markdown(results))
         print(f"saved: {shown(out / 'results.json')}")
+        kept = [row for row in results["songs"] if "performance" in row]
+        if kept:
+            worst = min(kept, key=lambda row: float(row["f1"]))
+            path = command_word(out / worst["performance"])
+            print(f"see the lowest F1, {worst['song']}: pianomime report {path}")

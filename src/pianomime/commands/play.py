@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from pianomime.commands.report import make_report
 from pianomime.keyboard import EXCERPT_SECONDS
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from pianomime.evaluation.summary import Row
     from pianomime.music import Score
     from pianomime.players import Player
 
@@ -80,76 +78,31 @@ class Play:
             InputError: there is nothing to play, or no such player.
             OSError: a file cannot be read or written.
         """
-        from rich.console import Console
-
-        from pianomime.commands.progress import bars
         from pianomime.file_names import file_name
-        from pianomime.files import staged
-        from pianomime.report import FILES, write_report
-        from pianomime.shown import shown
 
         player, score, name = self._load()
         out = self.out or Path("out", file_name(name))
-        notes: list[str] = []
-        with staged(out, FILES) as folder, bars() as progress:
-            row = write_report(
-                player.play(score, progress),
-                folder,
-                self.video,
-                progress=progress,
-                note=notes.append,
-            )
-        Console().print(_table(row))
-        for note in notes:
-            print(shown(note))
-        print(f"look and listen: {shown(out / 'report.html')}")
+        make_report(lambda progress: player.play(score, progress), out, self.video)
 
     def _load(self) -> tuple[Player, Score, str]:
         """Who plays what, and the name of its file."""
         from pianomime.errors import InputError
-        from pianomime.music import Score, excerpt
-        from pianomime.plan.demonstration import Demonstration
-        from pianomime.players import load_player
+        from pianomime.players.casting import Casting
         from pianomime.songs.find import find_song
 
-        shown = Demonstration.load(self.song) if Path(self.song).suffix == ".npz" else None
-        name = self.player or ("zero-shot" if shown is None else "demonstration")
-        start, seconds = self.start, self.seconds
-        if shown is not None and name in ("demonstration", "demonstration-ik"):
-            shown = shown.excerpt(start, seconds)
-            player = load_player(name, self.effort, self.seed, demonstration=shown, **self.settings)
-            return player, shown.score, Path(self.song).stem
-        player = load_player(name, self.effort, self.seed, **self.settings)
+        path = find_song(self.song)
+        shown = path.suffix == ".npz"
+        name = self.player or ("demonstration" if shown else "zero-shot")
+        casting = Casting.of(name, self.effort, self.seed, **self.settings)
+        player, score = casting.cast(path, self.start, self.seconds)
         if player.excerpt is not None:
-            for option in ("start", "seconds", "effort"):
-                if getattr(self, option) != getattr(Play, option):
-                    raise InputError(
-                        f"--{option}: {name} plays the excerpt that it was trained on, as it does"
-                    )
             start, seconds = player.excerpt
-        if shown is not None:
-            return player, shown.excerpt(start, seconds).score, Path(self.song).stem
-        midi = find_song(self.song)
-        return player, excerpt(Score.from_midi(midi), start, seconds), midi.stem
-
-
-def _table(row: Row) -> Table:
-    from rich.table import Table
-    from rich.text import Text
-
-    # A Text, not a str, in which rich would look for markup.
-    table = Table(title=Text(str(row["song"])), title_style="bold", show_header=False)
-    for label, text in (
-        ("F1", f"{row['f1']:.3f}"),
-        ("precision, recall", f"{row['precision']:.3f}, {row['recall']:.3f}"),
-        ("onset F1, pedal F1", f"{row['onset_f1']:.3f}, {row['pedal_f1']:.3f}"),
-        ("notes (left out)", f"{row['notes']} ({row['dropped_notes']})"),
-        ("physics broke", f"{row['blow_ups']} times"),
-        (
-            "planned, simulated",
-            f"{row['plan_seconds']:.1f} s, {row['simulate_seconds']:.1f} s "
-            f"for {row['song_seconds']:.1f} s of music",
-        ),
-    ):
-        table.add_row(label, text)
-    return table
+            trained = {"start": start, "seconds": seconds, "effort": player.effort}
+            for option, value in trained.items():
+                given, default = getattr(self, option), getattr(Play, option)
+                if given not in (default, value):
+                    raise InputError(
+                        f"--{option} {given:g}: {name} plays the excerpt that it was trained on, "
+                        f"as it does: --{option} {value:g}"
+                    )
+        return player, score, path.stem

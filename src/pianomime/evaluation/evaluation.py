@@ -8,7 +8,7 @@ import json
 import math
 import warnings
 from collections import Counter
-from collections.abc import Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,13 +17,14 @@ from typing import Any
 import pianomime
 from pianomime.errors import InputError
 from pianomime.evaluation.diagnose import CAUSES_SCHEMA
-from pianomime.evaluation.song_worker import SONG_WORKER, play_song
+from pianomime.evaluation.song_worker import SONG_WORKER, play_song, song_request
 from pianomime.evaluation.summary import ROW_SCHEMA
 from pianomime.file_names import file_name
 from pianomime.files import atomic, files_digest
 from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.players.casting import Casting
 from pianomime.players.player import Player
-from pianomime.players.registry import EFFORT, is_registered, load_player, player_files
+from pianomime.players.registry import EFFORT, is_registered, player_files
 from pianomime.players.settings import flat
 from pianomime.progress import Progress, no_progress
 from pianomime.sealed_json import read_json, sealed, unsealed
@@ -34,7 +35,8 @@ from pianomime.workers import answered, cores, work
 
 Row = dict[str, Any]
 """The numbers of one song (see `pianomime.evaluation.summary`) and its `causes` (see
-`pianomime.evaluation.diagnose.frames_by_cause`, if the player plans), or `song` and `error`."""
+`pianomime.evaluation.diagnose.frames_by_cause`, if the player plans), or `song` and `error`. With a
+folder for the results, `performance` names the song's performance in it."""
 
 # Those that decide how a song is played.
 _LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy")
@@ -57,10 +59,12 @@ def evaluate(
     A song that fails becomes a row with an `error`, and the others go on. With a folder `out`,
     a song that was finished there before is not played again, unless anything that decides how it
     is played has changed: the player, its settings, its files, our code, its libraries. So an
-    evaluation that was interrupted, however hard, resumes where it was.
+    evaluation that was interrupted, however hard, resumes where it was. The performance of each
+    song is kept there, too; of one that was deleted the row is still reused, and names none.
 
     Args:
-        paths: MIDI files, folders of them, or names of bundled songs.
+        paths: MIDI files, folders of them, demonstrations (.npz), or names of bundled songs. Of a
+            demonstration its score is played, by the players `demonstration` with its own plan.
         player: whatever `load_player` takes. A `Player` that was made already is played in this
             process, one song after the other, and nothing of an earlier call is reused.
         effort: how hard it tries, 0 to 3.
@@ -69,7 +73,8 @@ def evaluate(
         seconds: how much of each song to play at most, from its first note [s].
         jobs: processes; one a core that this one may use if None. They share the cores, so
             `realtime_factor` and the times depend on it.
-        out: folder for `results.json` and `results.md`, and the finished songs in `songs/`.
+        out: folder for `results.json` and `results.md`, and the finished songs with their
+            performances in `songs/`.
         progress: called with the songs done, the songs in all and their mean F1 so far.
 
     Returns:
@@ -91,9 +96,17 @@ def evaluate(
         raise InputError(f"jobs must be 1 or more, not {jobs}")
     chosen = _checked(flat(settings or {}))
     # What is wrong with the player is reported here, once, and not by every song.
-    loaded = load_player(player, effort, seed, **chosen)
-    if loaded.excerpt is not None and seconds != EXCERPT_SECONDS:
-        raise InputError("seconds: this player plays the excerpt that it was trained on")
+    casting = Casting.of(player, effort, seed, **chosen)
+    loaded = casting.player
+    if not any(map(casting.can_play, songs)):
+        raise InputError(f"{player}: plays demonstrations (.npz), and none is given")
+    if loaded is not None and loaded.excerpt is not None:
+        trained = loaded.excerpt[1]
+        if seconds not in (EXCERPT_SECONDS, trained):
+            raise InputError(
+                f"seconds: this player plays the {trained:g} s that it was trained on, not "
+                f"{seconds:g}"
+            )
     # Other processes cannot load such a player, and nobody can tell what it depends on.
     only_here = isinstance(player, Player) or is_registered(player)
     made_by = ""
@@ -120,8 +133,12 @@ def evaluate(
             else:
                 rows[song] = known
                 report()
+
+        def request(song: Path) -> dict[str, str]:
+            return song_request(song, None if store is None else store.performance(song))
+
         if only_here:
-            playing = _in_this_process(waiting, loaded, seconds)
+            playing = _in_this_process(waiting, casting, seconds, request)
         else:
             setup = {
                 "player": str(player),
@@ -130,18 +147,18 @@ def evaluate(
                 "settings": chosen,
                 "seconds": seconds,
             }
-            playing = work(SONG_WORKER, waiting, jobs or cores(), setup, str)
+            playing = work(SONG_WORKER, waiting, jobs or cores(), setup, request)
         with closing(playing) as played:
             for song, result in played:
                 row = {"song": title_of(song), **result}
                 if store is not None and "error" not in row:
-                    store.put(song, row)
+                    row = store.put(song, row)
                 rows[song] = row
                 report()
 
         results = {
-            "player": shown(loaded.name if isinstance(player, Player) else player),
-            "effort": loaded.effort if isinstance(player, Player) else effort,
+            "player": shown(player.name if isinstance(player, Player) else player),
+            "effort": player.effort if isinstance(player, Player) else effort,
             "seed": None if isinstance(player, Player) else seed,
             "settings": chosen,
             "seconds": seconds if math.isfinite(seconds) else None,
@@ -172,11 +189,14 @@ def _checked(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def _in_this_process(
-    songs: list[Path], player: Player, seconds: float
+    songs: list[Path],
+    casting: Casting,
+    seconds: float,
+    request: Callable[[Path], dict[str, str]],
 ) -> Generator[tuple[Path, Row], None, None]:
     """Songs with their rows, for a player that exists in this process alone."""
     for song in songs:
-        yield song, answered(lambda path: play_song(player, path, seconds), song)
+        yield song, answered(lambda asked: play_song(casting, asked, seconds), request(song))
 
 
 def read_row(path: Path) -> Row:
@@ -291,16 +311,32 @@ class _Store:
         except OSError:  # It cannot be read: whoever plays it says why.
             return None
         try:
-            return read_row(path)
+            return self._with_performance(song, read_row(path))
         except FileNotFoundError:
             pass
         except (InputError, OSError) as error:
             warnings.warn(f"{error}; the song is played again", stacklevel=2)
         return None
 
-    def put(self, song: Path, row: Row) -> None:
+    def put(self, song: Path, row: Row) -> Row:
+        """Keep the row of a finished song; as it stands in the results."""
         path = self._file(song)
         self._write(path, _json(sealed(row, path.name)))
+        return self._with_performance(song, row)
+
+    def performance(self, song: Path) -> Path | None:
+        """Where the performance of a song is kept; None for one that cannot be read."""
+        try:
+            return self._file(song).with_suffix(".npz")
+        except OSError:  # Whoever plays it says why.
+            return None
+
+    def _with_performance(self, song: Path, row: Row) -> Row:
+        """The row with the name of the performance, which may be deleted to save space."""
+        path = self.performance(song)
+        if path is None or not path.exists():
+            return row
+        return {**row, "performance": path.relative_to(self._out).as_posix()}
 
     def close(self, results: dict[str, Any]) -> None:
         self._write(self._out / "results.json", _json(results))

@@ -8,17 +8,14 @@ from typing import Any
 
 from pianomime.evaluation.diagnose import diagnose, frames_by_cause
 from pianomime.evaluation.summary import summarize
-from pianomime.music import Score
-from pianomime.music.excerpt import excerpt
-from pianomime.players.player import Player
-from pianomime.players.registry import load_player
+from pianomime.players.casting import Casting
 from pianomime.shown import title_of
 
 SONG_WORKER = "pianomime.evaluation.song_worker:load_song_worker"
 """`load_song_worker`, for `pianomime.workers`."""
 
 
-def load_song_worker(setup: dict[str, Any]) -> Callable[[str], dict[str, Any]]:
+def load_song_worker(setup: dict[str, Any]) -> Callable[[dict[str, str]], dict[str, Any]]:
     """Load a player, once for all songs of a process.
 
     Args:
@@ -26,18 +23,29 @@ def load_song_worker(setup: dict[str, Any]) -> Callable[[str], dict[str, Any]]:
             much of a song to play at most [s].
 
     Returns:
-        What plays a MIDI file and gives its row, as `play_song` does.
+        What plays the song of a `song_request` and gives its row, as `play_song` does.
     """
-    player = load_player(setup["player"], setup["effort"], setup["seed"], **setup["settings"])
-    return lambda path: play_song(player, Path(path), setup["seconds"])
+    casting = Casting.of(setup["player"], setup["effort"], setup["seed"], **setup["settings"])
+    return lambda request: play_song(casting, request, setup["seconds"])
 
 
-def play_song(player: Player, song: Path, seconds: float) -> dict[str, Any]:
+def song_request(song: Path, performance: Path | None) -> dict[str, str]:
+    """What a worker is asked, for JSON.
+
+    Args:
+        song: a MIDI file or a demonstration.
+        performance: where to keep its performance; None for nowhere.
+    """
+    kept = {} if performance is None else {"performance": str(performance)}
+    return {"song": str(song), **kept}
+
+
+def play_song(casting: Casting, request: dict[str, str], seconds: float) -> dict[str, Any]:
     """Play a song and score it.
 
     Args:
-        player: who plays.
-        song: a MIDI file.
+        casting: who plays.
+        request: a `song_request`.
         seconds: how much of it to play at most [s]; a player of one excerpt plays that.
 
     Returns:
@@ -46,9 +54,13 @@ def play_song(player: Player, song: Path, seconds: float) -> dict[str, Any]:
 
     Raises:
         InputError: the file cannot be read, or this player cannot play it.
+        OSError: the performance cannot be written.
     """
-    start, length = player.excerpt or (0.0, seconds)
-    performance = player.play(excerpt(Score.from_midi(song), start, length))
+    song = Path(request["song"])
+    player, score = casting.cast(song, 0.0, seconds)
+    performance = player.play(score)
+    if "performance" in request:
+        performance.save(request["performance"])
     # Two files can bear one title, but not one name in a folder.
     row: dict[str, Any] = {**summarize(performance), "song": title_of(song)}
     if performance.plan is not None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.archive import read_archive, write_arrays
+from pianomime.archive import holds, read_archive, write_arrays
 from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.keyboard import EXCERPT_SECONDS, FRAME_RATE, NO_KEY
@@ -203,11 +202,7 @@ class DemonstrationPlanner:
 
 def is_demonstration(path: str | os.PathLike[str]) -> bool:
     """Whether a file is a demonstration, of any version, rather than other arrays."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return f"{_MARK}.npy" in archive.namelist()
-    except (OSError, zipfile.BadZipFile):
-        return False
+    return holds(path, _MARK)
 
 
 def on_grid(score: Score) -> Score:

@@ -25,8 +25,9 @@ SCORE_SCHEMA = {
     "score_offset": Field("float", ("N",), 0, MAX_SECONDS),
     "score_velocity": Field("int", ("N",), 1, 127),
     "score_pedal": Field("float", ("P", 2), 0, MAX_SECONDS),
+    "score_remarks": Field("text", ("R",), optional=True),
 }
-"""The arrays of a score of N notes and P pedal intervals."""
+"""The arrays of a score of N notes and P pedal intervals, of which R remarks were made."""
 
 FINGERTIPS = Field("float", ("T", 2, POINT_COUNT, 3), -_FARTHEST, _FARTHEST)
 """Points of both hands in T frames [m]."""
@@ -43,13 +44,13 @@ PLAN_SCHEMA = {
 
 
 def score_arrays(score: Score) -> dict[str, NDArray[Any]]:
-    """A score as the arrays of `SCORE_SCHEMA`; what its file was mended of is not among them."""
-    title = {"score_title": np.array(score.title)}
-    return title | {
-        name: getattr(score, name.removeprefix("score_"))
-        for name in SCORE_SCHEMA
-        if name not in title
+    """A score as the arrays of `SCORE_SCHEMA`; remarks only where there are some."""
+    arrays = {
+        name: np.asarray(getattr(score, name.removeprefix("score_"))) for name in SCORE_SCHEMA
     }
+    if not score.remarks:
+        del arrays["score_remarks"]
+    return arrays
 
 
 def score_of(arrays: Mapping[str, NDArray[Any]]) -> Score:
@@ -65,6 +66,7 @@ def score_of(arrays: Mapping[str, NDArray[Any]]) -> Score:
         velocity=arrays["score_velocity"],
         pedal=arrays["score_pedal"],
         title=str(arrays["score_title"]),
+        remarks=tuple(map(str, arrays.get("score_remarks", ()))),
     )
 
 

@@ -32,6 +32,10 @@ from pianomime.track import (
 )
 
 
+class DemonstrationNeededError(InputError):
+    """The player plays demonstrations alone, and none was given."""
+
+
 def _with_sampling(tracker: Tracker, effort: int, sampling: PredictiveSamplingConfig) -> Tracker:
     return PredictiveSamplingTracker(tracker, sampling) if effort else tracker
 
@@ -84,7 +88,7 @@ def _demonstration_ik(
 
 def _demonstration_planner(demonstration: Demonstration | str | Path) -> DemonstrationPlanner:
     if not demonstration:
-        raise InputError("this player plays demonstrations (.npz), not MIDI files")
+        raise DemonstrationNeededError("this player plays demonstrations (.npz), not MIDI files")
     if not isinstance(demonstration, Demonstration):
         demonstration = Demonstration.load(demonstration)
     return DemonstrationPlanner(demonstration)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.archive import read_archive, write_arrays
+from pianomime.archive import holds, read_archive, write_arrays
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.music import Score, frame_metrics, notes_from_roll, onset_f1, pedal_f1
@@ -42,6 +42,8 @@ _FRAMES = {
     "pedal": Field("bool", ("T",)),
     "blow_ups": Field("int", ("B",), 0),
 }
+_MARK = "key_state"
+"""An array that other files do not hold."""
 _SECONDS = {name: Field("float", (), 0) for name in ("plan_seconds", "simulate_seconds")}
 _PLAYER = {"player": Field("text"), "effort": Field("int", (), 0)}
 _SCHEMA = {
@@ -205,6 +207,11 @@ class Performance:
             plan_seconds=float(arrays["plan_seconds"]),
             simulate_seconds=float(arrays["simulate_seconds"]),
         )
+
+
+def is_performance(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is a performance, of any version, rather than other arrays."""
+    return holds(path, _MARK)
 
 
 def _frames(onset: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.int64]:

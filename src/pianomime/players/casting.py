@@ -1,0 +1,97 @@
+"""Who plays a file, and what of it: of a MIDI file or of a demonstration, whose plan some need."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pianomime.errors import InputError
+from pianomime.music import Score, excerpt
+from pianomime.plan.demonstration import Demonstration
+from pianomime.players.builtin import DemonstrationNeededError
+from pianomime.players.performance import is_performance
+from pianomime.players.player import Player
+from pianomime.players.registry import load_player
+from pianomime.shown import command_word
+
+_SUFFIX = ".npz"
+"""Of demonstrations; any other file is read as MIDI."""
+
+
+@dataclass(frozen=True)
+class Casting:
+    """Finds the player and the score of files, one after the other.
+
+    Attributes:
+        source: as `load_player` takes it.
+        effort: how hard it tries, 0 to 3.
+        seed: of everything that is random.
+        settings: of the player, by name.
+        player: who plays all files; None where each demonstration has a player of its own, which
+            follows the demonstration's plan.
+    """
+
+    source: str | Path | Player
+    effort: int
+    seed: int
+    settings: dict[str, Any]
+    player: Player | None
+
+    @classmethod
+    def of(cls, source: str | Path | Player, effort: int, seed: int, **settings: Any) -> Casting:
+        """Load the player, where it is one for all files.
+
+        Args:
+            source: as `load_player` takes it.
+            effort: how hard it tries, 0 to 3.
+            seed: of everything that is random.
+            **settings: of the player.
+
+        Raises:
+            InputError: there is no such player, effort or setting, or its files cannot be used.
+        """
+        try:
+            player = load_player(source, effort, seed, **settings)
+        except DemonstrationNeededError:
+            player = None
+        return cls(source, effort, seed, settings, player)
+
+    def can_play(self, path: Path) -> bool:
+        """Whether the player plays files of this kind."""
+        return self.player is not None or path.suffix == _SUFFIX
+
+    def cast(self, path: Path, start: float, seconds: float) -> tuple[Player, Score]:
+        """Who plays a file, and what.
+
+        Args:
+            path: a MIDI file or a demonstration.
+            start: where to begin: with the first sound at or after it [s].
+            seconds: how much of it at most [s]. A player of one excerpt plays that instead.
+
+        Raises:
+            OSError: the file cannot be read.
+            InputError: it is of another kind, or damaged; nothing sounds in that part of it; or the
+                player needs a demonstration.
+        """
+        if self.player is not None and self.player.excerpt is not None:
+            start, seconds = self.player.excerpt
+        if not self.can_play(path):
+            raise DemonstrationNeededError(
+                f"{path}: {self.source} plays demonstrations (.npz), not MIDI files"
+            )
+        if path.suffix != _SUFFIX:
+            assert self.player is not None
+            return self.player, excerpt(Score.from_midi(path), start, seconds)
+        if is_performance(path):
+            raise InputError(
+                f"{path}: is a performance, which was played already; see and hear it with "
+                f"`pianomime report {command_word(path)}`"
+            )
+        shown = Demonstration.load(path).excerpt(start, seconds)
+        if self.player is not None:
+            return self.player, shown.score
+        made = load_player(
+            self.source, self.effort, self.seed, demonstration=shown, **self.settings
+        )
+        return made, shown.score
