@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import NO_KEY
 from pianomime.players.performance import Performance
 from pianomime.schema import Field, Schema
+from pianomime.short_repr import count, short_repr
 from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.model import SIDES
@@ -98,6 +99,16 @@ class Diagnosis:
     player: str
     wanted: int
     faults: list[Fault]
+
+    def __repr__(self) -> str:
+        frames = sum(fault.frames for fault in self.faults)
+        return short_repr(
+            self,
+            repr(self.song),
+            f"player {self.player!r}",
+            count(len(self.faults), "fault"),
+            f"{frames} of {self.wanted} frames",
+        )
 
 
 @dataclass(frozen=True)

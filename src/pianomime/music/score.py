@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.short_repr import count, short_repr
 from pianomime.shown import shown
 
 MAX_SECONDS = 4 * 3600.0
@@ -79,6 +80,11 @@ class Score:
             object.__setattr__(self, name, array)
         object.__setattr__(self, "title", shown(self.title))
         object.__setattr__(self, "remarks", tuple(self.remarks))
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self, repr(self.title), f"{self.duration:.1f} s", count(len(self), "note")
+        )
 
     @classmethod
     def from_midi(cls, path: str | os.PathLike[str]) -> Score:

@@ -26,6 +26,7 @@ from pianomime.plan.plan_arrays import (
 )
 from pianomime.schema import Field, check_json
 from pianomime.sealed_json import parse_json
+from pianomime.short_repr import count, short_repr
 
 TRAIN = "train"
 """Name of the split that is used for training."""
@@ -82,6 +83,15 @@ class Demonstration:
             raise ValueError(
                 f"the plan is for {len(self.plan.note_hand)} notes, the score has {len(self.score)}"
             )
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self,
+            repr(self.score.title),
+            f"{len(self.plan) / FRAME_RATE:.1f} s",
+            count(len(self.score), "note"),
+            f"source {self.source!r}",
+        )
 
     def excerpt(self, start: float = 0.0, seconds: float = EXCERPT_SECONDS) -> Demonstration:
         """Cut out a part, between frames, that begins with the first sound at or after `start`.

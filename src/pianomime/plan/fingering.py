@@ -28,6 +28,7 @@ from pianomime.plan.fingering_cost import (
 )
 from pianomime.plan.fingertip_plan import LEFT, RIGHT
 from pianomime.progress import Steps
+from pianomime.short_repr import short_repr
 from pianomime.world.layout import FINGER_COUNT
 
 _MOST_DROPPED = {7: 4, 8: 4, 9: 3, 10: 3}
@@ -54,6 +55,8 @@ class Fingering:
     finger: NDArray[np.int8]
     start: NDArray[np.int64]
     stop: NDArray[np.int64]
+
+    __repr__ = short_repr
 
 
 def find_fingering(score: Score, config: FingeringConfig | None = None) -> Fingering:

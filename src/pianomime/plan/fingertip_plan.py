@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.keyboard import KEYS
+from pianomime.keyboard import FRAME_RATE, KEYS
+from pianomime.short_repr import count, short_repr
 
 LEFT, RIGHT = 0, 1
 """Index of a hand in every plan array: keyboard order, bass side first."""
@@ -55,6 +56,12 @@ class FingertipPlan:
             raise ValueError("note_hand and note_finger must both have one entry per note")
         if not np.isfinite(self.fingertips).all():
             raise ValueError("fingertips hold values that are not finite")
+
+    def __repr__(self) -> str:
+        notes = count(len(self.note_hand), "note")
+        return short_repr(
+            self, f"{len(self) / FRAME_RATE:.1f} s", f"{notes} ({self.dropped} dropped)"
+        )
 
     def __len__(self) -> int:
         """Number of frames."""

@@ -9,6 +9,7 @@ from pianomime.players.player import Player
 from pianomime.policies.generalist import OneStageController, TwoStageController
 from pianomime.policies.policy import Policy
 from pianomime.policies.policy_tracker import PolicyTracker
+from pianomime.short_repr import short_repr
 from pianomime.track import Controller
 
 
@@ -29,6 +30,9 @@ class GeneralistPlayer(Player):
     high: Policy | None = None
     seed: int = 0
     effort: int = 0
+
+    def __repr__(self) -> str:
+        return short_repr(self, repr(self.name), f"effort {self.effort}")
 
     def start(self, score: Score) -> Controller:
         """Load nothing, plan nothing: everything happens frame by frame."""

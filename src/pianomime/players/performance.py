@@ -27,6 +27,7 @@ from pianomime.plan.plan_arrays import (
     score_of,
 )
 from pianomime.schema import Field
+from pianomime.short_repr import count, short_repr
 from pianomime.world.layout import LAYOUT
 
 _VELOCITY = 64
@@ -106,6 +107,16 @@ class Performance:
                     f"a plan of {planned[0]} frames and {planned[1]} notes "
                     f"for a score of {frames} and {len(self.score)}"
                 )
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self,
+            repr(self.score.title),
+            f"player {self.player!r}",
+            f"{self.song_seconds:.1f} s",
+            count(len(self.score), "note"),
+            f"F1 {frame_metrics(self.score.roll(), self.pressed).f1:.3f}",
+        )
 
     def __len__(self) -> int:
         """Number of frames."""

@@ -14,6 +14,7 @@ from pianomime.plan import Planner
 from pianomime.players.performance import Performance
 from pianomime.players.rollout import rollout
 from pianomime.progress import Progress, no_progress, telling
+from pianomime.short_repr import short_repr
 from pianomime.track import Controller, Tracker
 from pianomime.world import World
 from pianomime.world.layout import LAYOUT
@@ -115,6 +116,9 @@ class PlannedPlayer(Player):
     tracker: Tracker
     effort: int = 0
     excerpt: tuple[float, float] | None = None
+
+    def __repr__(self) -> str:
+        return short_repr(self, repr(self.name), f"effort {self.effort}")
 
     def start(self, score: Score) -> Controller:
         """Plan the whole score, then start the tracker."""

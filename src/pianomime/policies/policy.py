@@ -15,6 +15,7 @@ from pianomime.policies.features import Observation, action_reference
 from pianomime.policies.horizon import CHUNK, MOST_DIFFUSION_STEPS
 from pianomime.policies.sampler import Sampler, ddim_sample
 from pianomime.sealed_json import parse_json
+from pianomime.short_repr import short_repr
 
 FORMAT = "pianomime policy"
 VERSION = 2
@@ -57,6 +58,8 @@ class AsinhNormalizer:
     median: tuple[float, ...]
     unit: tuple[float, ...]
     limit: tuple[float, ...]
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for name, values in vars(self).items():

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.plan import FingertipPlan
+from pianomime.short_repr import short_repr
 from pianomime.world import World
 
 
@@ -25,6 +26,8 @@ class ReplayController:
     ctrl: NDArray[np.float64]
     replayable: ClassVar[bool] = True
 
+    __repr__ = short_repr
+
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) the stored control of a frame."""
         row: NDArray[np.float64] = self.ctrl[frame]
@@ -40,6 +43,8 @@ class ReplayTracker:
     """
 
     ctrl: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     def start(self, plan: FingertipPlan) -> ReplayController:
         """A controller that plays them.

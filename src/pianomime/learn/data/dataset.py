@@ -17,6 +17,7 @@ from pianomime.errors import InputError
 from pianomime.learn.data.published import read_published
 from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.plan.demonstration import TRAIN, Demonstration, is_demonstration
+from pianomime.short_repr import short_repr
 from pianomime.shown import shown
 
 DEMONSTRATION_COLUMNS = ("goal", "fingertips")
@@ -50,6 +51,8 @@ class Dataset:
     ends: NDArray[np.int64]
     song_id: NDArray[np.int64]
     name: list[str]
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         """Number of clips."""

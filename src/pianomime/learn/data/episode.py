@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import KEYS
 from pianomime.music import Score, frame_metrics
 from pianomime.players.rollout import rollout
+from pianomime.short_repr import short_repr
 from pianomime.track import Controller
 from pianomime.world import World
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
@@ -38,6 +39,8 @@ class Episode:
     columns: dict[str, NDArray[Any]]
     song_id: int = -1
     split: str = "train"
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ from pianomime.learn.data.format import FORMAT, VERSION, zarr_attributes
 from pianomime.schema import Field, ListOf, Schema
 from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
+from pianomime.short_repr import short_repr
 from pianomime.staging import hold
 
 _CHUNK = 4096
@@ -138,6 +139,8 @@ class TrajectoryData:
     group: zarr.Group
     ends: NDArray[np.int64]
     episodes: list[dict[str, Any]]
+
+    __repr__ = short_repr
 
     @classmethod
     def open(cls, path: Path) -> TrajectoryData:

@@ -30,6 +30,7 @@ from pianomime.learn.envs.state import EnvState
 from pianomime.plan import FingertipPlan
 from pianomime.plan.demonstration import Demonstration
 from pianomime.players.rollout import rollout
+from pianomime.short_repr import short_repr
 from pianomime.track import BatchController, BatchTracker, DynamicTracker, IkTracker
 from pianomime.world import World, WorldBatch
 from pianomime.world.layout import LAYOUT
@@ -69,6 +70,8 @@ class Step:
     truncated: NDArray[np.bool_]
     f1: NDArray[np.float64]
     blow_ups: NDArray[np.int64]
+
+    __repr__ = short_repr
 
 
 class SongBatch:

@@ -15,6 +15,7 @@ from pianomime.music import Score
 from pianomime.music.excerpt import excerpt
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.plan.demonstration import Demonstration
+from pianomime.short_repr import short_repr
 from pianomime.songs.find import find_song
 
 MIN_FRAMES = round(FRAME_RATE)
@@ -34,6 +35,8 @@ class Reference:
     goal: NDArray[np.bool_]
     pedal: NDArray[np.bool_]
     plan: FingertipPlan
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, demonstration: Demonstration) -> Reference:

@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from pianomime.learn.envs.sb3_base import Sb3BaseEnv
 from pianomime.learn.runs.safetensors_file import Arrays
+from pianomime.short_repr import short_repr
 from pianomime.world import WorldBatch
 
 
@@ -46,6 +47,8 @@ class PlayedFrame:
     goal: NDArray[np.bool_]
     pressed: NDArray[np.bool_]
     key_state: NDArray[np.float64]
+
+    __repr__ = short_repr
 
 
 class Sb3MultiSongEnv(Sb3BaseEnv):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.learn.envs.reference import Reference
+from pianomime.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class EnvState:
     pedal: NDArray[np.bool_]
     base_control: NDArray[np.float64]
     action: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         """Number of environments, n."""

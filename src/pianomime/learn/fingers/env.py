@@ -14,6 +14,7 @@ from pianomime.music import Score
 from pianomime.plan import ZeroShotPlanner
 from pianomime.plan.demonstration import Demonstration
 from pianomime.policies.finger_residual import ACTIONS, AGENTS, SIZE, FingerObservation, controls
+from pianomime.short_repr import short_repr
 from pianomime.track import DynamicTracker
 from pianomime.track.dynamic import DynamicController
 from pianomime.world.layout import LAYOUT
@@ -40,6 +41,8 @@ class PlannedSong:
     pedal: NDArray[np.bool_]
     controller: DynamicController
     observation: FingerObservation
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, score: Score) -> PlannedSong:

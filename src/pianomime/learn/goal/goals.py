@@ -18,6 +18,7 @@ from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.sdf import QUERY_HIGH, QUERY_LOW
 from pianomime.music import Score
 from pianomime.progress import Progress
+from pianomime.short_repr import short_repr
 from pianomime.songs.find import find_songs
 
 
@@ -32,6 +33,8 @@ class Goals:
 
     packed: NDArray[np.uint8]
     frames: NDArray[np.int64]
+
+    __repr__ = short_repr
 
     @classmethod
     def from_roll(cls, roll: NDArray[np.bool_]) -> Goals:

@@ -23,6 +23,7 @@ from pianomime.policies.features import (
     tracking_observation,
 )
 from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
+from pianomime.short_repr import short_repr
 from pianomime.world.hand import both_hands, hand_points
 from pianomime.world.layout import LAYOUT, POINT_COUNT, POINTS_SIZE
 
@@ -48,6 +49,8 @@ class Samples:
     dataset: Dataset
     config: PolicyConfig
     points: NDArray[np.float32]
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, dataset: Dataset, config: PolicyConfig) -> Samples:

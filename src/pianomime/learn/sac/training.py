@@ -34,6 +34,7 @@ from pianomime.policies.features import holding_controls, tracking_observation
 from pianomime.policies.horizon import CHUNK
 from pianomime.policies.policy import PolicyInfo
 from pianomime.progress import Progress, no_progress
+from pianomime.short_repr import short_repr
 from pianomime.songs.find import find_songs
 from pianomime.validation import within
 from pianomime.world.hand import by_actuator, hand_points
@@ -66,6 +67,8 @@ class GoalSong:
 
     goal: NDArray[np.bool_]
     pedal: NDArray[np.bool_]
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, score: Score) -> GoalSong:

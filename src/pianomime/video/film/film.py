@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.short_repr import short_repr
 from pianomime.video.film.media import open_media
 from pianomime.video.film.read_ahead import ahead
 
@@ -40,6 +41,8 @@ class Frame:
 
     seconds: float
     picture: NDArray[np.uint8]
+
+    __repr__ = short_repr
 
 
 class Film:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.plan import LEFT, RIGHT
+from pianomime.short_repr import short_repr
 from pianomime.video.hands.repair import repair
 from pianomime.video.hands.sightings import Sighting, Sightings
 from pianomime.video.keyboard.plane import Plane
@@ -53,6 +54,8 @@ class HandTracks:
     mended: NDArray[np.bool_]
     ghosts: int
     swaps: int
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         """Number of frames."""

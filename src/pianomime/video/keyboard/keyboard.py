@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import BLACK, KEYS, key_name
+from pianomime.short_repr import short_repr
 from pianomime.video.keyboard.geometry import BLACK_FRONT, FAR, FRONT, LEFT_EDGE, WHITE_WIDTH
 from pianomime.video.keyboard.lines import Lines, black_place, find_lines, sample
 from pianomime.video.keyboard.plane import Plane, fit_plane
@@ -39,6 +40,8 @@ class Keyboard:
     error_pixels: float
     mirrored: bool
     doubt: float
+
+    __repr__ = short_repr
 
     def describe(self) -> str:
         """One line for the user."""

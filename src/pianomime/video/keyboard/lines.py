@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, maximum_filter1d, minimum_filter1d, uniform_filter1d
 
+from pianomime.short_repr import short_repr
+
 # Positions of the black keys of an octave, in widths of a white key from the left edge of C. Pianos
 # differ by a tenth either way; simulated black keys are exactly on the edges of white keys.
 _BLACK_AT = np.array([0.94, 2.06, 3.92, 5.0, 6.08])
@@ -63,6 +65,8 @@ class Lines:
     rows: tuple[float, float]
     blacks: NDArray[np.int64]
     score: float
+
+    __repr__ = short_repr
 
     def pixels(self, u: NDArray[np.float64], r: NDArray[np.float64]) -> NDArray[np.float64]:
         """(..., 2) Column, row of coordinates u along the keyboard and r across it."""

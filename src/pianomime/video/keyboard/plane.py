@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pianomime.short_repr import short_repr
+
 _TRIALS = 500
 """Random samples of four points in a robust fit."""
 
@@ -21,6 +23,8 @@ class Plane:
     """
 
     matrix: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     def to_world(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """(..., 2) World x, y [m] of pixels (..., 2), column and row."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.music import Score
+from pianomime.short_repr import short_repr
 from pianomime.video.notes.touch import misfit
 from pianomime.world.layout import FINGER_COUNT
 
@@ -55,6 +56,8 @@ class NoteFingers:
     finger: NDArray[np.int8]
     stop: NDArray[np.int64]
     misfit: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @property
     def guessed(self) -> NDArray[np.bool_]:
