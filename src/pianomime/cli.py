@@ -59,6 +59,9 @@ class Command(NamedTuple):
 
 COMMANDS = {
     "play": Command("pianomime.commands.play", "Play", "play a song and report on it"),
+    "report": Command(
+        "pianomime.commands.report", "Report", "see, hear and score a saved performance"
+    ),
     "evaluate": Command(
         "pianomime.commands.evaluate", "Evaluate", "play and score many songs", goes_on=True
     ),
