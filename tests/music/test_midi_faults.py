@@ -287,6 +287,16 @@ def test_is_read_as_meant(tmp_path: Path, content: bytes, wanted: str, remark: s
             [[0, 0.5 - 1 / 960], [0.5, 1]],
             id="up and down in one instant",
         ),
+        pytest.param(
+            header() + track(b"\x00" + DOWN + C4 + b"\x00\xb1\x40\x7f" + E4 + b"\x00" + UP + END),
+            [[0, 1]],
+            id="two channels, one pedal",
+        ),
+        pytest.param(
+            header() + track(b"\x00" + DOWN + C4 + b"\xff\xff\xff\x7f" + UP + END),
+            [[0, 4 * 3600]],
+            id="lifted after days",
+        ),
     ],
 )
 def test_pedal_is_read_as_meant(tmp_path: Path, content: bytes, wanted: list[list[float]]) -> None:
@@ -343,3 +353,22 @@ def test_reference_files_are_read_right(shared: Path) -> None:
         assert score.pedal == pytest.approx(np.reshape(pedal.get(file.stem, []), (-1, 2)), abs=1e-3)
         assert len(told) == bool(score.remarks)
         assert not told or re.search(r": \d+", told[0])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(header() + track(C4 + END * 200_000), id="many ends"),
+        pytest.param(
+            header(3000)
+            + track(b"\x00" + ON + END) * 3000
+            + track(b"\x00\xb1\x7b\x00" * 20_000 + END),
+            id="all notes off, where another channel holds many",
+        ),
+    ],
+)
+def test_work_is_in_proportion_to_the_size(tmp_path: Path, content: bytes) -> None:
+    """Done in a second; where each event looked at all before it, in minutes."""
+    path = tmp_path / "song.mid"
+    path.write_bytes(content)
+    assert len(read(path)[0]) >= 1

@@ -29,7 +29,7 @@ from pianomime.music.other_kinds import advice
 from pianomime.music.score import MAX_SECONDS, Score, ScoreError
 from pianomime.shown import title_of
 
-_MOST_BYTES = 32 << 20
+_MOST_BYTES = 8 << 20
 """Largest file that is read; four hours of music take less than a megabyte."""
 
 _MICROS_PER_BEAT = 500_000.0
@@ -88,7 +88,8 @@ def read_midi(path: Path) -> Score:
         onset=onset[on_piano],
         offset=offset[on_piano],
         velocity=velocity[on_piano],
-        pedal=np.concatenate(pedals),
+        # It may be moved when all notes have ended long ago.
+        pedal=np.minimum(np.concatenate(pedals), MAX_SECONDS),
         title=title_of(path),
         remarks=tuple(remarks),
     )

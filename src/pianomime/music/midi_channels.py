@@ -33,6 +33,10 @@ _DRUM_BANKS = {b"": (), _GENERAL_MIDI: (120,), _GS: (), _XG: (126, 127)}
 """Banks that make a channel one of drums, by standard: General MIDI 2 and XG."""
 
 
+_Place = tuple[int, int]
+"""Track and pitch of a key."""
+
+
 @dataclass
 class Sounds:
     """What sounds, in ticks from the beginning.
@@ -71,9 +75,9 @@ class _Channels:
     def __init__(self) -> None:
         self.sounds = Sounds()
         self.port: defaultdict[int, int] = defaultdict(int)
-        # By track, channel and pitch: begin, pitch that sounds, velocity.
-        self.held: defaultdict[tuple[int, int, int], list[tuple[int, int, int]]] = defaultdict(list)
-        self.missing_ends: Counter[tuple[int, int, int]] = Counter()
+        # By channel, then by track and pitch: begin, pitch that sounds, velocity.
+        self.held: defaultdict[int, dict[_Place, list[tuple[int, int, int]]]] = defaultdict(dict)
+        self.missing_ends: Counter[tuple[int, _Place]] = Counter()
         # When the pedal went down, and the channel that moved it.
         self.pedal: tuple[int, int] | None = None
         self.bank: dict[int, int] = {}
@@ -106,7 +110,7 @@ class _Channels:
         if kind == _NOTE_ON and data[1]:
             self._strike(tick, track, channel, *data)
         elif kind in (_NOTE_OFF, _NOTE_ON):
-            self._release(tick, (track, channel, data[0]))
+            self._release(tick, channel, (track, data[0]))
         elif kind == _CONTROL:
             self._control(tick, channel, *data)
         elif kind == _PROGRAM and channel in self.bank and _DRUM_BANKS[self.standard]:
@@ -119,21 +123,23 @@ class _Channels:
         shift = self.master_shift + self.part_shift.get(channel, 0) + self.tuning.get(channel, 0)
         if shift:
             self.sounds.counts["notes transposed, as the file asks"] += 1
-        self.held[track, channel, pitch].append((tick, pitch + shift, velocity))
+        held = self.held[channel].setdefault((track, pitch), [])
+        held.append((tick, pitch + shift, velocity))
 
-    def _release(self, tick: int, place: tuple[int, int, int]) -> None:
-        held = self.held.pop(place, None)
+    def _release(self, tick: int, channel: int, place: _Place) -> None:
+        held = self.held[channel].pop(place, None)
         if held is None:
             # Of two notes on one key that overlap, the end of the first has ended both.
-            self.missing_ends[place] = max(self.missing_ends[place] - 1, 0)
+            if self.missing_ends[channel, place]:
+                self.missing_ends[channel, place] -= 1
             return
         # An end at the very beginning of a note is that of the note before it, if there is one.
         before = [note for note in held if note[0] < tick]
         if before and len(before) < len(held):
-            self.held[place] = held[len(before) :]
+            self.held[channel][place] = held[len(before) :]
         ended = before or held
         self._end(ended, tick)
-        self.missing_ends[place] += len(ended) - 1
+        self.missing_ends[channel, place] += len(ended) - 1
 
     def _end(self, notes: list[tuple[int, int, int]], tick: int) -> None:
         self.sounds.notes += [(begin, tick, pitch, velocity) for begin, pitch, velocity in notes]
@@ -148,8 +154,8 @@ class _Channels:
                 self._move_pedal(tick, channel, down=False)
             self.parameter.pop(channel, None)
         elif number in _ALL_OFF:
-            for place in [place for place in self.held if place[1] == channel]:
-                self._release(tick, place)
+            for place in list(self.held[channel]):
+                self._release(tick, channel, place)
         elif number == _BANK:
             self.bank[channel] = value
         elif number in _NO_PARAMETER:
@@ -196,9 +202,10 @@ class _Channels:
     def finish(self, ends: list[int]) -> Sounds:
         """What has sounded, after all tracks have ended."""
         made = self.sounds
-        for place, held in self.held.items():
-            self._end(held, ends[place[0]])
-            made.counts["notes without an end, held until their track ends"] += len(held)
+        for places in self.held.values():
+            for (track, _), held in places.items():
+                self._end(held, ends[track])
+                made.counts["notes without an end, held until their track ends"] += len(held)
         if missing := sum(self.missing_ends.values()):
             made.counts["notes without an end, held until another on their key ends"] = missing
         if self.pedal is not None:

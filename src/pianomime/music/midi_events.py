@@ -175,10 +175,12 @@ def _read_track(
     at = tick = status = 0
     packets = b""
     ended = False
+    # Some writers fill a track up with zeros.
+    filled = len(track.rstrip(b"\0"))
     try:
         while at < len(track):
             if ended:
-                if not believed or not any(track[at:]):
+                if not believed or at >= filled:
                     break
                 repairs["ends in the middle of a track, passed over"] += 1
                 ended = False
