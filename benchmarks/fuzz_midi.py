@@ -18,6 +18,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from pianomime import songs
@@ -76,24 +77,27 @@ def mutated(content: bytearray, random: random.Random) -> bytes:
     return bytes(content)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--count", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("folders", nargs="*", type=Path, help="with more MIDI files to mutate")
-    options = parser.parse_args()
+def fuzz(count: int, seed: int, folders: Sequence[Path] = ()) -> tuple[Counter[str], Counter[str]]:
+    """Read files, and count what came of them.
+
+    Args:
+        count: number of files.
+        seed: of their making.
+        folders: with more MIDI files to mutate.
+
+    Returns:
+        What was read and refused, and faults.
+    """
     files = [songs.path(name) for name in songs.names()]
-    files += [file for folder in options.folders for file in sorted(folder.rglob("*.mid"))]
+    files += [file for folder in folders for file in sorted(folder.rglob("*.mid"))]
     originals = [file.read_bytes()[:LONGEST] for file in files]
-    choose = random.Random(options.seed)
+    choose = random.Random(seed)
     counts: Counter[str] = Counter()
     faults: Counter[str] = Counter()
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "song.mid")
-        for index in range(options.count):
+        for index in range(count):
             kind = choose.randrange(8)
             if kind == 0:
                 content = choose.randbytes(choose.randrange(200))
@@ -104,29 +108,47 @@ def main() -> None:
             else:
                 content = mutated(bytearray(choose.choice(originals)), choose)
             path.write_bytes(content)
-            with warnings.catch_warnings(record=True) as told:
-                warnings.simplefilter("always")
-                try:
-                    score = Score.from_midi(path)
-                    if score.duration < 60 and index % 4 == 0:
-                        score.roll()
-                        score.pedal_roll()
-                        score.to_midi(path)
-                    counts["read with a remark" if score.remarks else "read"] += 1
-                    if len(told) != bool(score.remarks) or not len(score):
-                        raise AssertionError("a remark without a warning, or no notes")
-                except InputError as error:
-                    counts["refused"] += 1
-                    if "\n" in str(error):
-                        faults["an error of several lines"] += 1
-                except Exception as error:
-                    where = traceback.extract_tb(error.__traceback__)[-1]
-                    reason = f"{type(error).__name__}: {error} ({where.name}:{where.lineno})"
-                    if not faults[reason]:
-                        print(f"{reason}\n    {content.hex()}")
-                    faults[reason] += 1
+            try:
+                counts[outcome(path, use=index % 4 == 0)] += 1
+            except Exception as error:
+                where = traceback.extract_tb(error.__traceback__)[-1]
+                reason = f"{type(error).__name__}: {error} ({where.name}:{where.lineno})"
+                if not faults[reason]:
+                    print(f"{reason}\n    {content.hex()}")
+                faults[reason] += 1
             if (index + 1) % 10_000 == 0:
                 print(f"{index + 1:7d} files, {time.perf_counter() - began:.0f} s", flush=True)
+    return counts, faults
+
+
+def outcome(path: Path, use: bool) -> str:
+    """Read a file, and use what was read; any exception of this function is a fault."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            score = Score.from_midi(path)
+        except InputError as error:
+            if "\n" in str(error):
+                raise AssertionError("an error of several lines") from error
+            return "refused"
+    assert len(score), "no notes"
+    assert len(told) == bool(score.remarks), "a remark without a warning"
+    if use and score.duration < 60:
+        score.roll()
+        score.pedal_roll()
+        score.to_midi(path)
+    return "read with a remark" if score.remarks else "read"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=100_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("folders", nargs="*", type=Path, help="with more MIDI files to mutate")
+    options = parser.parse_args()
+    counts, faults = fuzz(options.count, options.seed, options.folders)
     for name, count in (*counts.items(), *faults.items()):
         print(f"{count:7d} {name}")
     print(f"{faults.total():7d} faults in {options.count} files, seed {options.seed}")
