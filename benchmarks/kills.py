@@ -37,12 +37,13 @@ from typing import Any
 import numpy as np
 
 import common
+from pianomime.seal import SEAL
 
 MARK = "PIANOMIME_KILLED_RUN"
 """Name in the environment of every process of a run."""
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-TIMES = {"plan_seconds", "simulate_seconds", "realtime_factor"}
-"""Names of numbers that differ from run to run, in JSON and in .npz files."""
+TIMES = {"plan_seconds", "simulate_seconds", "realtime_factor", SEAL}
+"""Names of what differs from run to run, in JSON and in .npz files: times, and digests of them."""
 _TIMED_TEXT = re.compile(r"\d[\d.,]*\s?(x|s|ms)\b|(?<=per second of computing)\D*[\d.]+")
 """Times in pages and tables."""
 _LOGS = "tensorboard"
