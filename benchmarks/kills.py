@@ -37,6 +37,7 @@ from typing import Any
 import numpy as np
 
 import common
+from pianomime.learn.runs.safetensors_file import read_tensors
 from pianomime.seal import SEAL
 
 MARK = "PIANOMIME_KILLED_RUN"
@@ -361,7 +362,13 @@ class Trial:
             return subprocess.Popen(
                 _command(self._case, self._inputs),
                 cwd=self._place,
-                env=_environment() | {MARK: str(self._place), "TMPDIR": str(self._temporary)},
+                env=_environment()
+                | {
+                    MARK: str(self._place),
+                    "TMPDIR": str(self._temporary),
+                    # A cache that torch keeps on purpose.
+                    "TORCHINDUCTOR_CACHE_DIR": str(self._inputs / "torch"),
+                },
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=said,
@@ -429,6 +436,12 @@ def content(folder: Path) -> dict[str, Any]:
                 for array in sorted(set(file.files) - TIMES):
                     value = file[array]
                     found[f"{name}: {array}"] = value.dtype.str, value.shape, value.tobytes()
+        elif path.suffix == ".safetensors":
+            # Its library writes the metadata in another order each time.
+            arrays, metadata = read_tensors(path)
+            found[f"{name}: metadata"] = _without_times(metadata)
+            for array, value in arrays.items():
+                found[f"{name}: {array}"] = value.dtype.str, value.shape, value.tobytes()
         elif path.suffix == ".json":
             found[name] = _without_times(json.loads(path.read_text()))
         elif path.suffix in (".html", ".md"):
