@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pianomime.archive import read_archive, read_arrays, write_arrays
+from pianomime.archive import holds, read_archive, read_arrays, write_arrays
 from pianomime.errors import InputError
 from pianomime.schema import Field
 
@@ -119,3 +119,26 @@ def test_what_a_file_only_claims_takes_no_memory(tmp_path: Path) -> None:
         file.writestr("rows.npy", header.getvalue())
     with pytest.raises(InputError, match="rows is not as long as it says"):
         read_arrays(path, "a thing", {"rows": Field("float", ("T", 2))})
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<U0", "fortran_order": False, "shape": (10**8,)}
+    )
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("rows.npy", header.getvalue())
+    with pytest.raises(InputError, match="rows is larger than any"):
+        read_arrays(path, "a thing", {"rows": Field("text", ("T",))})
+
+
+def test_a_damaged_list_of_arrays_holds_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "some.npz"
+    np.savez(path, rows=np.zeros(3))
+    whole = path.read_bytes()
+    assert holds(path, "rows")
+    assert not holds(path, "columns")
+    at = whole.find(b"PK\x01\x02")
+    for place in range(at, at + 46):
+        for value in (0, 63, 224, 255):
+            path.write_bytes(whole[:place] + bytes([value]) + whole[place + 1 :])
+            holds(path, "rows")  # without an exception of any kind
+    path.write_bytes(whole[: at + 6] + bytes([224]) + whole[at + 7 :])
+    assert not holds(path, "rows")

@@ -8,6 +8,8 @@ from itertools import combinations
 
 _MOST_NAMES = 3
 """Names that a message suggests at most."""
+_LONGEST_REASON = 200
+"""Letters of what another library says that a message repeats."""
 _SHORTEST_PART = 4
 """Letters of the shortest part of a name that is compared: shorter ones are like many others."""
 
@@ -32,6 +34,16 @@ class TrainingDiverged(WorkFailed):
 
 class UnknownNameError(InputError):
     """There is nothing of that name."""
+
+
+def reason_of(error: Exception) -> str:
+    """The first line of what an error of any library says, for a message; not all of a long one.
+
+    Args:
+        error: the message of which may be empty.
+    """
+    lines = str(error).splitlines() or [type(error).__name__]
+    return lines[0][:_LONGEST_REASON]
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -19,6 +19,8 @@ from pianomime.errors import InputError
 
 MOST_BYTES = 1024**3
 """Bytes of the largest array that is read: what claims more is damaged."""
+_TEXT_BYTES = 64
+"""Bytes that a text takes when it is looked at, even one that takes none in an array."""
 _MOST_INT = 2**63 - 1
 """The largest whole number that arrays can hold."""
 
@@ -42,7 +44,7 @@ class Field:
         kind: of its values; "number" is any of the first three, in arrays of others; "object" is
             any object of JSON.
         shape: () for a single value. Sizes that a schema leaves open are letters; one letter is
-            one size in the whole file.
+            one size in all arrays of a file.
         least, most: range of its numbers; both included.
         choices: the only texts; any if empty.
         optional: whether it may be missing.
@@ -82,7 +84,8 @@ class Field:
         if not fits:
             wanted = ", ".join(str(sizes.get(str(want), want)) for want in self.shape)
             raise InputError(f"{name} must have the shape ({wanted}), not {tuple(shape)}")
-        if math.prod(shape) * dtype.itemsize > MOST_BYTES:
+        least = _TEXT_BYTES if dtype.kind == "U" else 1
+        if math.prod(shape) * max(dtype.itemsize, least) > MOST_BYTES:
             raise InputError(f"{name} is larger than any that this program writes")
 
     def check_values(self, name: str, array: NDArray[Any]) -> None:
@@ -120,12 +123,12 @@ class Field:
             size, *rest = self.shape
             if not isinstance(value, list) or (isinstance(size, int) and len(value) != size):
                 raise InputError(f"{name} must be a list of {size} ({self.kind})")
-            inner = Field(self.kind, tuple(rest), self.least, self.most, self.choices)
+            inner = replace(self, shape=tuple(rest))
             for each in value:
                 inner.check_json(name, each)
             return
         if type(value) not in _TYPES[self.kind]:
-            raise InputError(f"{name} must be {self.kind}, not {_short(value)}")
+            raise InputError(f"{name} must be {self.kind}, not {short(value)}")
         if self.kind == "text":
             self._check_choice(name, value)
         elif self.kind in ("int", "float"):
@@ -141,7 +144,7 @@ class Field:
 
     def _check_choice(self, name: str, text: str) -> None:
         if self.choices and text not in self.choices:
-            raise InputError(f"{name} must be one of {', '.join(self.choices)}, not {_short(text)}")
+            raise InputError(f"{name} must be one of {', '.join(self.choices)}, not {short(text)}")
 
 
 @dataclass(frozen=True)
@@ -179,7 +182,7 @@ def check_names(names: Sequence[str], schema: Mapping[str, Schema], more: bool =
         if name not in names and not (isinstance(field, Field) and field.optional):
             raise InputError(f"{name} is missing")
     if not more and (odd := sorted(set(names) - set(schema))):
-        raise InputError(f"{_short(odd[0])} does not belong there")
+        raise InputError(f"{short(odd[0])} does not belong there")
 
 
 def check_json(content: Any, schema: Schema, name: str = "the content") -> None:
@@ -192,20 +195,20 @@ def check_json(content: Any, schema: Schema, name: str = "the content") -> None:
         schema.check_json(name, content)
     elif isinstance(schema, ListOf):
         if not isinstance(content, list):
-            raise InputError(f"{name} must be a list, not {_short(content)}")
+            raise InputError(f"{name} must be a list, not {short(content)}")
         for number, each in enumerate(content):
             check_json(each, schema.schema, f"{name} {number}")
     else:
         if not isinstance(content, dict):
-            raise InputError(f"{name} must be an object, not {_short(content)}")
+            raise InputError(f"{name} must be an object, not {short(content)}")
         if isinstance(schema, Mapping):
             check_names(list(content), schema)
         for inner, value in content.items():
             rule = schema[inner] if isinstance(schema, Mapping) else schema.schema
-            check_json(value, rule, _short(inner)[1:-1])
+            check_json(value, rule, short(inner)[1:-1])
 
 
-def _short(value: object) -> str:
+def short(value: object) -> str:
     """A value for a message, in one line that is not long."""
     text = ascii(value) if isinstance(value, str) else repr(value)
     return text if len(text) <= 40 else f"{text[:37]}..."

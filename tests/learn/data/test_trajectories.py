@@ -257,3 +257,58 @@ def test_a_data_set_of_an_older_version_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="collect it again") as error:
         TrajectoryData.open(out)
     assert "\n" not in str(error.value)
+    # Which can be done, in the same place; and so it is with one that is damaged.
+    write_trajectories(out, iter([Episode("one", 0.0, "ik", columns)]))
+    assert len(TrajectoryData.open(out)) == 1
+    (out / "goal" / "zarr.json").write_text("[")
+    write_trajectories(out, iter([Episode("one", 0.0, "ik", columns)]))
+    assert len(TrajectoryData.open(out)) == 1
+    (tmp_path / "notes").mkdir()
+    with pytest.raises(InputError, match="something else"):
+        write_trajectories(tmp_path / "notes", iter([Episode("one", 0.0, "ik", columns)]))
+
+
+class Killed(BaseException):
+    """What ends a process at once."""
+
+
+@pytest.mark.parametrize("moment", ["between", "after"])
+def test_killed_while_one_replaces_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: str
+) -> None:
+    columns = {name: np.ones((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    out = tmp_path / "experts.zarr"
+    write_trajectories(out, iter([Episode("old", 0.0, "ik", columns)]))
+    replace = os.replace
+
+    def killed(source: str | Path, target: str | Path) -> None:
+        if moment == "after" or Path(target) != out:
+            replace(source, target)
+        if Path(target) == out:
+            raise Killed
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pianomime.learn.data.trajectories.os.replace", killed)
+        # A killed process puts nothing back.
+        patch.setattr("pianomime.learn.data.trajectories._undo", lambda older, path: None)
+        with pytest.raises(Killed):
+            write_trajectories(out, iter([Episode("new", 0.0, "ik", columns)]))
+    assert out.exists() == (moment == "after")
+    # The next run sweeps, and comes to nothing: one of both is there, whole, and nothing else.
+    with pytest.raises(InputError, match="no episodes"):
+        write_trajectories(out, iter(()))
+    name = "new" if moment == "after" else "old"
+    assert TrajectoryData.open(out).episode(0).name == name
+    assert [each.name for each in tmp_path.iterdir()] == [out.name]
+
+
+@pytest.mark.parametrize("name", ["qpos_1e4", "qvel_500", "ctrl_1e4"])
+@pytest.mark.parametrize("value", [1e20, 1e300, -1e20])
+def test_published_numbers_out_of_range(tmp_path: Path, name: str, value: float) -> None:
+    published(tmp_path, np.zeros((6, 54)), np.zeros((6, 46)), np.zeros((6, 88)))
+    with np.load(tmp_path / "experts.npz") as file:
+        arrays = dict(file)
+    arrays[name] = np.full(arrays[name].shape, value)
+    np.savez(tmp_path / "experts.npz", **arrays)
+    with pytest.raises(InputError, match=name):
+        next(published_episodes(tmp_path / "experts.npz", tmp_path / "demonstrations.npz"))

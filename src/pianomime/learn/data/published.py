@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.archive import read_arrays
-from pianomime.errors import InputError
+from pianomime.errors import InputError, reason_of
 from pianomime.installation import install_command
 from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.music import Score
@@ -78,12 +78,14 @@ _HUMAN = {
     "goal_packed": _PACKED,
     **_MARKS,
 }
+_LARGEST = 2**15
+"""Numbers of the published experts are of 16 bits."""
 _RECORDED = {
     **_CLIP_ID,
-    "qpos_1e4": Field("number", ("T", LAYOUT.hands_size)),
-    "qvel_500": Field("number", ("T", LAYOUT.hands_size)),
+    "qpos_1e4": Field("number", ("T", LAYOUT.hands_size), -_LARGEST, _LARGEST),
+    "qvel_500": Field("number", ("T", LAYOUT.hands_size), -_LARGEST, _LARGEST),
     "key_state_255": Field("number", ("T", KEYS), 0, 255),
-    "ctrl_1e4": Field("number", ("T", LAYOUT.ctrl_size)),
+    "ctrl_1e4": Field("number", ("T", LAYOUT.ctrl_size), -_LARGEST, _LARGEST),
 }
 """Experts' trajectories, and the demonstrations that they were trained on."""
 
@@ -356,7 +358,7 @@ def _zarr(folder: Path) -> list[_Clip]:
         state, action_array, end_array = group["state"], group["action"], meta["episode_ends"]
         for array, width in zip((state, action_array), _WIDTHS, strict=True):
             if array.ndim != 2 or array.shape[1] != width:
-                raise InputError(f"{refusal}: its columns are {array.shape[1:]}, not ({width},)")
+                raise InputError(f"its columns are {array.shape[1:]}, not ({width},)")
         # Tips of the frame itself, and the keys (key + 1) / 89 of its fingers; what follows are
         # those of the frames to come.
         columns = POINTS_SIZE + 2 * FINGER_COUNT
@@ -369,8 +371,7 @@ def _zarr(folder: Path) -> list[_Clip]:
         _TIPS.check_values("action", action[:, :POINTS_SIZE])
     # A damaged store raises what its codecs and its metadata happen to raise.
     except Exception as error:
-        reason = (str(error) or type(error).__name__).splitlines()[0].removeprefix(f"{refusal}: ")
-        raise InputError(f"{refusal} ({reason[:200]})") from error
+        raise InputError(f"{refusal} ({reason_of(error)})") from error
     if not len(ends) or (np.diff(ends, prepend=-1) <= 0).any() or ends[-1] != len(action) - 1:
         raise InputError(f"{refusal}: its clips do not end where its {len(action)} rows do")
     clips: list[_Clip] = []

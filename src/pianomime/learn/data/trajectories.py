@@ -18,6 +18,7 @@ digest of each column of each episode, too: a chunk that is gone reads as zeros.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
@@ -30,10 +31,10 @@ import zarr
 from numpy.typing import NDArray
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
-from pianomime.errors import InputError
+from pianomime.errors import InputError, reason_of
 from pianomime.learn.data.episode import COLUMNS, Column, Episode
-from pianomime.learn.data.format import FORMAT, VERSION, zarr_attributes
-from pianomime.schema import Field, ListOf, Schema
+from pianomime.learn.data.format import FORMAT, VERSION, is_data_set, is_data_set, zarr_attributes
+from pianomime.schema import Field, ListOf, Schema, short
 from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
 from pianomime.short_repr import short_repr
@@ -75,10 +76,15 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
             are no episodes.
         OSError: it cannot be written.
     """
-    if path.exists():
-        TrajectoryData.open(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with hold(path) as folder:
+        # Not in the folder, which the next process sweeps: for a moment it is the only data set.
+        older = path.with_name(_aside(path.name))
+        if older.exists():
+            _undo(older, path)
+        # One of an earlier version, or a damaged one, is replaced as well.
+        if path.exists() and not is_data_set(path):
+            raise InputError(f"{path}: is something else than a data set")
         fresh = Path(folder, path.name)
         group = zarr.open_group(str(fresh), mode="w", zarr_format=3)
         for name, column in COLUMNS.items():
@@ -113,14 +119,13 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
         end_array.attrs["description"] = "one past the last row of each episode"
         content = {"format": FORMAT, "version": VERSION, "ends": ends[1:], "episodes": rows}
         group.attrs.update(sealed(content))
-        older = Path(folder, "older")
         if path.exists():
             os.replace(path, older)
         try:
             os.replace(fresh, path)
         except BaseException:
             if older.exists():
-                os.replace(older, path)
+                _undo(older, path)
             raise
         shutil.rmtree(older, ignore_errors=True)
     return len(rows)
@@ -154,7 +159,7 @@ class TrajectoryData:
             raise InputError(f"{path}: not a data set of trajectories")
         if attributes.get("version") != VERSION:
             raise InputError(
-                f"{path}: a data set of version {_short(attributes.get('version'))}; this program "
+                f"{path}: a data set of version {short(attributes.get('version'))}; this program "
                 f"reads {VERSION}: collect it again"
             )
         try:
@@ -176,7 +181,7 @@ class TrajectoryData:
                 raise InputError("episode_end is not what the attributes say")
         # A damaged store raises what its codecs and its metadata happen to raise.
         except Exception as error:
-            raise InputError(f"{path}: damaged ({_reason(error)})") from error
+            raise InputError(f"{path}: damaged ({reason_of(error)})") from error
         return cls(group, ends, content["episodes"])
 
     def __len__(self) -> int:
@@ -201,7 +206,7 @@ class TrajectoryData:
                     raise InputError(f"{name} of episode {number} is not finite")
         # A damaged store raises what its codecs happen to raise.
         except Exception as error:
-            raise InputError(f"{self.group.store_path}: damaged ({_reason(error)})") from error
+            raise InputError(f"{self.group.store_path}: damaged ({reason_of(error)})") from error
         return columns
 
     def episode(self, number: int) -> Episode:
@@ -215,6 +220,19 @@ class TrajectoryData:
             facts["song_id"],
             facts["split"],
         )
+
+
+def _aside(name: str) -> str:
+    """Where a data set is while another takes its place: a hash, for names may be long."""
+    return f".pianomime-older-{hashlib.sha256(os.fsencode(name)).hexdigest()[:16]}"
+
+
+def _undo(older: Path, path: Path) -> None:
+    """Put a data set back that was set aside; if the new one is in its place, it is not needed."""
+    if path.exists():
+        shutil.rmtree(older)
+    else:
+        os.replace(older, path)
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
@@ -231,12 +249,3 @@ def _chunks(column: Column) -> tuple[int, ...]:
 def _digest(columns: Mapping[str, NDArray[Any]], name: str) -> str:
     """The seal of one column of an episode."""
     return seal_of({name: columns[name].astype(COLUMNS[name].dtype, copy=False)})
-
-
-def _reason(error: Exception) -> str:
-    """The first line of an error of any library."""
-    return (str(error) or type(error).__name__).splitlines()[0][:200]
-
-
-def _short(value: object) -> str:
-    return repr(value)[:16]
