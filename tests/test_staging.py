@@ -106,10 +106,15 @@ def test_nothing_is_left_of_a_writer_that_fails(
     error: type[BaseException], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    with pytest.raises(error), hold(tmp_path / "out") as folder, scratch() as temporary:
-        (folder / "a").touch()
-        (temporary / "b").touch()
-        raise error
+
+    def fail() -> None:
+        with hold(tmp_path / "out") as folder, scratch() as temporary:
+            (folder / "a").touch()
+            (temporary / "b").touch()
+            raise error
+
+    with pytest.raises(error):
+        fail()
     assert [*tmp_path.iterdir()] == []
 
 

@@ -149,6 +149,38 @@ def test_a_worker_ends_in_the_middle_of_work_when_who_asked_is_killed(tmp_path: 
     assert _eventually(lambda: not _alive(int(pid)))
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only the kernel of Linux does this")
+def test_the_kernel_ends_a_worker_whose_input_another_process_holds_open(tmp_path: Path) -> None:
+    note = tmp_path / "pid"
+    # As a process does that was forked from who asked: the end of the input is never seen.
+    script = (
+        "import os, subprocess, sys\n"
+        "from pianomime.workers import Worker\n"
+        f"worker = Worker({THIS!r})\n"
+        "held = worker._process.stdin.fileno()\n"
+        "holder = subprocess.Popen(['sleep', '600'], pass_fds=[held], stdout=subprocess.DEVNULL)\n"
+        "print(holder.pid, flush=True)\n"
+        f"worker.ask(('write', {str(note)!r}))\n"
+    )
+    places = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    asking = subprocess.Popen(
+        [sys.executable, "-c", script],
+        env={**os.environ, "PYTHONPATH": places},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert asking.stdout is not None
+    holder = int(asking.stdout.readline())
+    try:
+        pid = int(_eventually(lambda: note.exists() and note.read_text()))
+        asking.kill()
+        asking.communicate()
+        assert _eventually(lambda: not _alive(pid))
+        assert _alive(holder)
+    finally:
+        os.kill(holder, signal.SIGKILL)
+
+
 def test_it_is_cheap_to_import() -> None:
     heavy = "('numpy', 'torch', 'mujoco', 'rich')"
     script = f"import sys, pianomime.workers; print([n for n in {heavy} if n in sys.modules])"
