@@ -12,12 +12,79 @@ import pytest
 
 from pianomime.errors import InputError
 from pianomime.policies.finger_residual import SIZE
+from pianomime.policies.interface import Shapes, inputs_of, outputs_of
 from pianomime.policies.methods import FINGERS, policy_path
 from pianomime.policies.network_file import load_network
+from pianomime.policies.policy import METADATA, PolicyInfo
 from pianomime.policies.stamp import check_stamp, main, stamped
 
 
-def test_a_stamp_changes_nothing_else_and_finds_every_flipped_bit(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        (None, "the following arguments are required: FILE.onnx"),
+        ("none.onnx", "none.onnx: No such file"),
+        ("notes.txt", "notes.txt: is no ONNX file"),
+        ("notes.onnx", "notes.onnx: is no ONNX file"),
+    ],
+)
+def test_what_cannot_be_stamped_is_said_and_left_alone(
+    name: str | None,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for note in ("notes.txt", "notes.onnx"):
+        (tmp_path / note).write_text("to do")
+    monkeypatch.setattr("sys.argv", ["stamp", *([] if name is None else [str(tmp_path / name)])])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err
+    assert all((tmp_path / note).read_text() == "to do" for note in ("notes.txt", "notes.onnx"))
+
+
+@pytest.mark.parametrize(("probabilities", "actions"), [(4, 2), (2, 4), (0, 0), (3, 3)])
+def test_bins_have_a_probability_and_an_action_each(
+    probabilities: int, actions: int, tmp_path: Path
+) -> None:
+    onnx = pytest.importorskip("onnx")
+    info = PolicyInfo("high-bet", "high", "bet", 36)
+    sizes = {"probability": (1, probabilities), "actions": (1, actions, 36)}
+    values = [
+        onnx.numpy_helper.from_array(np.zeros((1, *shape), np.float32), name)
+        for name, shape in sizes.items()
+    ]
+
+    def declared(shapes: Shapes) -> list[Any]:
+        make = onnx.helper.make_tensor_value_info
+        return [make(name, 1, ["B", *(each or "N" for each in shapes[name])]) for name in shapes]
+
+    nodes = [onnx.helper.make_node("Constant", [], [value.name], value=value) for value in values]
+    graph = onnx.helper.make_graph(
+        nodes, "bins", declared(inputs_of(info)), declared(outputs_of(info))
+    )
+    opset = [onnx.helper.make_opsetid("", 17)]
+    model = onnx.helper.make_model(graph, opset_imports=opset, ir_version=8)
+    onnx.helper.set_model_props(model, {METADATA: info.to_metadata()})
+    path = tmp_path / "bins.onnx"
+    path.write_bytes(stamped(model.SerializeToString()))
+    run, _ = load_network(path)
+    given = {
+        name: np.zeros([1, *(each or 1 for each in shape)], np.float32)
+        for name, shape in inputs_of(info).items()
+    }
+    if probabilities == actions and actions:
+        assert run(given)[1].shape == (1, 1, actions, 36)
+    else:
+        with pytest.raises(InputError, match="do not fit together"):
+            run(given)
+
+
+def test_a_stamp_changes_nothing_else_and_finds_every_flipped_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     whole = policy_path(FINGERS).read_bytes()
     check_stamp(whole)
     assert stamped(whole) == whole
@@ -27,7 +94,8 @@ def test_a_stamp_changes_nothing_else_and_finds_every_flipped_bit(tmp_path: Path
     path.write_bytes(bare)
     with pytest.raises(InputError, match=r"python -m pianomime\.policies\.stamp"):
         load_network(path)
-    main([str(path)])
+    monkeypatch.setattr("sys.argv", ["stamp", str(path)])
+    main()
     assert path.read_bytes() == whole
     rng = np.random.default_rng(0)
     for at in [*rng.integers(len(whole), size=200), *range(len(whole) - 76, len(whole))]:

@@ -101,6 +101,14 @@ def load_network(path: Path, name: str = "") -> tuple[Inference, PolicyInfo]:
         for array, (output, shape) in zip(arrays, outputs.items(), strict=True):
             if not _fits((batch, *shape), array.shape) or not np.isfinite(array).all():
                 raise InputError(f"{path}: the network's {output} is not what it should be")
+        # Sizes that a policy leaves open, such as a number of bins, are one size.
+        free = {
+            array.shape[1 + shape.index(None)]
+            for array, shape in zip(arrays, outputs.values(), strict=True)
+            if None in shape
+        }
+        if len(free) > 1 or 0 in free:
+            raise InputError(f"{path}: the network's outputs do not fit together")
         return arrays
 
     return run, info

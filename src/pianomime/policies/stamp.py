@@ -8,14 +8,15 @@ byte, and other programs read it as before. A policy that another program wrote 
 
 from __future__ import annotations
 
+import argparse
 import hashlib
-import sys
 from pathlib import Path
 
 from pianomime.errors import InputError
 from pianomime.files import atomic
 from pianomime.seal import SEAL
 
+_VERSION_FIELD = b"\x08"
 _DIGITS = hashlib.sha256().digest_size * 2
 
 
@@ -59,20 +60,23 @@ def check_stamp(content: bytes) -> None:
         raise InputError("it was changed since it was written")
 
 
-def main(paths: list[str]) -> None:
-    """Stamp files in place.
-
-    Args:
-        paths: of ONNX files.
-
-    Raises:
-        OSError: one cannot be read or written.
-    """
-    for path in map(Path, paths):
-        content = stamped(path.read_bytes())
-        with atomic(path) as temporary:
-            temporary.write_bytes(content)
+def main() -> None:
+    """Stamp the files that the command line names, in place."""
+    parser = argparse.ArgumentParser(description="Add to ONNX files the digest of their content.")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE.onnx")
+    for path in parser.parse_args().files:
+        try:
+            content = path.read_bytes()
+            # The first field of a model is the version of the format.
+            if path.suffix != ".onnx" or content[:1] != _VERSION_FIELD:
+                raise InputError("is no ONNX file")
+            with atomic(path) as temporary:
+                temporary.write_bytes(stamped(content))
+        except OSError as error:
+            parser.exit(2, f"{path}: {error.strerror or error}\n")
+        except InputError as error:
+            parser.exit(2, f"{path}: {error}\n")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()
