@@ -34,6 +34,7 @@ from pianomime.errors import InputError
 
 _HOST = "127.0.0.1"
 _LAST_PORT = 65535
+_USUAL_PORT = 80
 _SECRET_BYTES = 16
 _LARGEST_HEADERS = 16_384
 """[bytes]"""
@@ -138,7 +139,10 @@ class LocalServer:
         port = self._sockets[0].getsockname()[1]
         secret = secrets.token_urlsafe(_SECRET_BYTES)
         self.url = f"http://{_HOST}:{port}/{secret}/"
-        hosts = [f"{name}:{port}" for name in (_HOST, "localhost")]
+        names = (_HOST, "localhost")
+        hosts = [f"{name}:{port}" for name in names]
+        if port == _USUAL_PORT:  # Browsers leave it out.
+            hosts += names
         rules = [
             (f"/[^/]*/{re.escape(path)}", kind, dict(given))
             for path, (kind, given) in handlers.items()

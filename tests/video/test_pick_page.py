@@ -140,6 +140,20 @@ def test_a_foreign_name_for_this_machine_is_refused(page, out):
     assert not out.exists()
 
 
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
+def test_browsers_leave_out_the_usual_port(video, out, monkeypatch, name):
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    # As if it were 80, which not everybody may use.
+    monkeypatch.setattr(local_server, "_USUAL_PORT", port)
+    with PickPage(Film(video), out, port) as page:
+        talk = Talk(page)
+        headers = {"Host": name, "Origin": f"http://{name}"}
+        assert talk.send(talk.request(body=good_points(), **headers))[0] == 200
+        headers["Origin"] = "http://evil.example"
+        assert talk.send(talk.request(body=good_points(), **headers))[0] == 403
+
+
 @pytest.mark.parametrize(
     "path",
     [
