@@ -2,6 +2,9 @@
 
 A seal is of the content, not of the bytes: names, types, shapes and values. It tells accidents and
 edits; it is no signature, for everybody can compute it.
+
+Messages and files call it the digest of the content, which people know; in ONNX files it is one of
+the bytes, at their end, and is called a stamp (`pianomime.policies.stamp`).
 """
 
 from __future__ import annotations

@@ -38,20 +38,20 @@ def bars(line_seconds: float = _LINE_SECONDS) -> Iterator[Progress]:
         line_seconds: time between lines [s].
     """
     console = Console(stderr=True)
-    shown = _Shown()
+    board = _Shown()
     with ExitStack() as stack:
         # Not what rich takes for a terminal: with FORCE_COLOR that may be a file.
         if sys.stderr.isatty() and not console.is_dumb_terminal:
             live = Live(
-                get_renderable=lambda: shown,
+                get_renderable=lambda: board,
                 console=console,
                 transient=True,
                 refresh_per_second=_FRAMES_A_SECOND,
             )
             stack.enter_context(live)
         else:
-            stack.enter_context(_lines(shown, line_seconds))
-        yield shown.report
+            stack.enter_context(_lines(board, line_seconds))
+        yield board.report
 
 
 @dataclass
@@ -133,14 +133,14 @@ class _Shown:
 
 
 @contextmanager
-def _lines(shown: _Shown, seconds: float) -> Iterator[None]:
+def _lines(board: _Shown, seconds: float) -> Iterator[None]:
     """Print a line about the phase at hand every so many seconds."""
     over = threading.Event()
 
     def work() -> None:
         while not over.wait(seconds):
-            if shown.phase is not None:
-                print(f"pianomime: {_line(shown.phase)}", file=sys.stderr, flush=True)
+            if board.phase is not None:
+                print(f"pianomime: {_line(board.phase)}", file=sys.stderr, flush=True)
 
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
