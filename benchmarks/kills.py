@@ -55,6 +55,9 @@ _PATIENCE = 30.0
 _MOMENT = 3.0
 """[s] after its end for the processes that it started."""
 
+_FEW = 3
+"""Differences that are told."""
+
 _SAC = """
 import sys
 from pianomime.learn.sac import training
@@ -65,10 +68,12 @@ main(sys.argv[1:])
 _TRAINER = shlex.split(
     "--trainer.steps=300 --trainer.batch=32 --trainer.warmup=10 --trainer.checkpoint-seconds=0.2"
 )
-_NETWORK = shlex.split(
+_DIFFUSION = shlex.split(
     "--diffusion.channels 8 16 --diffusion.encoder-channels 8 --diffusion.condition-layers 16 "
-    "--diffusion.steps=10 --bet.layers=1 --bet.heads=2 --bet.width=16 --bet.bins=4 --mlp.hidden 16"
+    "--diffusion.steps=10"
 )
+_BET = shlex.split("--bet.layers=1 --bet.heads=2 --bet.width=16 --bet.bins=4")
+_MLP = shlex.split("--mlp.hidden 16")
 _SEARCH = shlex.split("--search.variations=4 --search.rounds=1 --total-steps=2000")
 _PPO = shlex.split(
     "--ppo.num-envs=4 --ppo.steps-per-update=128 --ppo.batch-size=64 --ppo.n-epochs=2 "
@@ -91,9 +96,9 @@ class Case:
     script: str = ""
 
 
-def _train(policy: str, *data: str) -> Case:
+def _train(policy: str, network: Sequence[str], *data: str) -> Case:
     return Case(
-        ["train", policy, *data, "--goal", "{inputs}/goal", "-o", "out", *_TRAINER, *_NETWORK],
+        ["train", policy, *data, "--goal", "{inputs}/goal", "-o", "out", *_TRAINER, *network],
         ["demos", "experts.zarr", "goal"],
     )
 
@@ -129,10 +134,10 @@ CASES = {
         ["few"],
     ),
     "train-goal": Case(["train-goal", *_SONGS, "-o", "out", *_TRAINER], ["songs"]),
-    "train (high-diff)": _train("high-diff", "--demonstrations", "{inputs}/demos"),
-    "train (low-diff)": _train("low-diff", *_EXPERTS),
-    "train (low-bet)": _train("low-bet", *_EXPERTS),
-    "train (bc-mse)": _train("bc-mse", *_EXPERTS),
+    "train (high-diff)": _train("high-diff", _DIFFUSION, "--demonstrations", "{inputs}/demos"),
+    "train (low-diff)": _train("low-diff", _DIFFUSION, *_EXPERTS),
+    "train (low-bet)": _train("low-bet", _BET, *_EXPERTS),
+    "train (bc-mse)": _train("bc-mse", _MLP, *_EXPERTS),
     "train-fingers": Case(
         [
             *("train-fingers", *_SONGS, "-o", "out", "--threads=1", "--total-steps=2400"),
@@ -462,12 +467,13 @@ def _without_times(value: Any) -> Any:
 
 
 def differences(wanted: dict[str, Any], found: dict[str, Any]) -> list[str]:
-    """What differs between two outputs, in a line each."""
+    """What differs between two outputs, in a line each; of many, the first few."""
     lines = [f"{name} is missing" for name in wanted.keys() - found.keys()]
     lines += [f"{name} should not be there" for name in found.keys() - wanted.keys()]
     both = wanted.keys() & found.keys()
     lines += [f"{name} is another" for name in both if wanted[name] != found[name]]
-    return sorted(lines)
+    few = sorted(lines)[:_FEW]
+    return few if len(few) == len(lines) else [*few, f"and {len(lines) - _FEW} more"]
 
 
 def tried(
