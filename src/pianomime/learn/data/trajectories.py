@@ -33,7 +33,7 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from pianomime.errors import InputError, reason_of
 from pianomime.learn.data.episode import COLUMNS, Column, Episode
-from pianomime.learn.data.format import FORMAT, VERSION, is_data_set, is_data_set, zarr_attributes
+from pianomime.learn.data.format import FORMAT, VERSION, is_data_set, zarr_attributes
 from pianomime.schema import Field, ListOf, Schema, short
 from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
