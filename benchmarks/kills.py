@@ -47,6 +47,8 @@ TIMES = {"plan_seconds", "simulate_seconds", "realtime_factor", SEAL}
 """Names of what differs from run to run, in JSON and in .npz files: times, and digests of them."""
 _TIMED_TEXT = re.compile(r"\d[\d.,]*\s?(x|s|ms)\b|(?<=per second of computing)\D*[\d.]+")
 """Times in pages and tables."""
+_STOPPED = re.compile(r"(pianomime: .* left.*\n)*pianomime: stopped.*\n")
+"""What a command says that is stopped, and how far it is every half minute before."""
 _LOGS = "tensorboard"
 """A folder of logs, with times and numbers of processes in the names of its files."""
 
@@ -346,7 +348,7 @@ class Trial:
         if number != signal.SIGKILL:
             if process.returncode != 128 + number:
                 wrong.append(f"ended with {process.returncode}")
-            if not re.fullmatch(r"pianomime: stopped[^\n]*\n", self._errors()):
+            if not _STOPPED.fullmatch(self._errors()):
                 wrong.append(f"said {self._errors()!r}")
             wrong += [f"left {name} at once" for name in self._hidden()]
         again = self._start()
