@@ -18,6 +18,7 @@ Linux only: processes are found by a mark in their environment. What `retarget` 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import os
 import random
@@ -180,9 +181,7 @@ class Inputs:
             if name == "film.mp4":
                 if self._film is None:
                     return "no video: --film names one"
-                try:
-                    import mediapipe  # noqa: F401
-                except ImportError:
+                if importlib.util.find_spec("mediapipe") is None:
                     return "the extra `video` is not installed"
                 shutil.copy(self._film, self.folder / name)
                 continue
