@@ -48,7 +48,7 @@ TIMES = {"plan_seconds", "simulate_seconds", "realtime_factor", SEAL}
 """Names of what differs from run to run, in JSON and in .npz files: times, and digests of them."""
 _TIMED_TEXT = re.compile(r"\d[\d.,]*\s?(x|s|ms)\b|(?<=per second of computing)\D*[\d.]+")
 """Times in pages and tables."""
-_STOPPED = re.compile(r"(pianomime: .* left.*\n)*pianomime: stopped.*\n")
+_STOPPED = re.compile(r"(pianomime: .* (left|so far).*\n)*pianomime: stopped.*\n")
 """What a command says that is stopped, and how far it is every half minute before."""
 _LOGS = "tensorboard"
 """A folder of logs, with times and numbers of processes in the names of its files."""
