@@ -58,7 +58,7 @@ from pianomime.archive import write_arrays
 from pianomime.errors import InputError
 from pianomime.evaluation.evaluation import read_row
 from pianomime.plan.demonstration import Demonstration
-from pianomime.players.performance import Performance
+from pianomime.players.performance import Performance, is_performance
 from pianomime.policies.methods import policy_path
 from pianomime.policies.network_file import load_network
 from pianomime.policies.stamp import stamped
@@ -215,6 +215,9 @@ def _published_zarr(path: Path) -> None:
 
 
 def _read_performance(path: Path) -> Any:
+    # What a file is is asked first.
+    if not is_performance(path):
+        raise InputError("not a performance")
     read = Performance.load(path)
     read.metrics()
     return [vars(read) | {"score": _plain(read.score), "plan": _plain(read.plan)}]
@@ -225,7 +228,9 @@ def _plain(thing: Any) -> Any:
 
 
 def _read_demonstration(path: Path) -> Any:
-    read = Demonstration.load(path)
+    from pianomime.learn.data.dataset import read_demonstrations
+
+    (read,) = read_demonstrations(path)
     return vars(read) | {"score": _plain(read.score), "plan": _plain(read.plan)}
 
 
@@ -252,8 +257,12 @@ def _read_expert(path: Path) -> Any:
 
 
 def _read_trajectories(path: Path) -> Any:
+    from pianomime.learn.data.format import is_data_set, training_songs
     from pianomime.learn.data.trajectories import TrajectoryData
 
+    training_songs(path)
+    if not is_data_set(path):
+        raise InputError("not a data set")
     data = TrajectoryData.open(path)
     return [vars(data.episode(number)) for number in range(len(data))]
 
@@ -301,6 +310,8 @@ def _read_published(path: Path) -> Any:
 
 _OPTIONAL = ("split", "odd", "song_group", "length", "goal_packed")
 """Arrays that published clips may lack."""
+_END = 1024
+"""Bytes of a file's end, in which every fourth change of bytes is."""
 _NESTED = "[" * 100_000
 _ODD: list[Any] = [None, "text", -1e9, [], {}, [[1]], float("nan"), float("inf"), 10**400, True]
 
@@ -310,7 +321,9 @@ def _flip_bytes(path: Path, rng: Rng, _: bool) -> str:
     files = sorted(file for file in path.rglob("*") if file.is_file()) or [path]
     file = files[rng.integers(len(files))]
     content = bytearray(file.read_bytes())
-    at, way = int(rng.integers(max(len(content), 1))), int(rng.integers(7))
+    # The end of an archive is its list of arrays, which is short and read in many places.
+    first = max(len(content) - _END, 0) if rng.integers(4) == 0 else 0
+    at, way = int(rng.integers(first, max(len(content), 1))), int(rng.integers(7))
     if way >= 5 and len(files) == 1:
         way -= 5
     if way <= 1 and content:
