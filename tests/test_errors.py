@@ -1,10 +1,10 @@
-"""Messages for names that nothing has."""
+"""Messages for names that nothing has, and of errors of other libraries."""
 
 from __future__ import annotations
 
 import pytest
 
-from pianomime.errors import InputError, closest, unknown_name
+from pianomime.errors import InputError, closest, reason_of, unknown_name
 
 
 @pytest.mark.parametrize(
@@ -33,3 +33,11 @@ def test_unknown_name_lists_all_names() -> None:
     )
     far = unknown_name("player", "xylophone", ["zero-shot", "fingers"])
     assert str(far) == "there is no player 'xylophone'; there are: zero-shot, fingers"
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [(ValueError("one\ntwo"), "one"), (KeyError(), "KeyError"), (ValueError("x" * 999), "x" * 200)],
+)
+def test_the_reason_of_an_error_is_one_line(error: Exception, reason: str) -> None:
+    assert reason_of(error) == reason

@@ -49,7 +49,7 @@ class Field:
         choices: the only texts; any if empty.
         optional: whether it may be missing.
         may_be_nan: whether NaN may stand in an array for what is not known.
-        may_be_infinite: whether a single number of JSON may be infinite; those of arrays never are.
+        may_be_infinite: whether numbers of JSON may be infinite; those of arrays never are.
     """
 
     kind: Literal["bool", "int", "float", "number", "text", "object"]
