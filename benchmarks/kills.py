@@ -334,7 +334,9 @@ class Trial:
             process.wait()
             wrong.append(f"had not ended after {_PATIENCE:.0f} s")
         took = time.monotonic() - sent
-        if process.returncode == 0:
+        # With all done, while the interpreter ends, signals do what they do to any process.
+        leaving = number != signal.SIGKILL and process.returncode == -number
+        if process.returncode == 0 or (leaving and content(self._place) == self._wanted):
             return None
         left = self._processes()
         deadline = time.monotonic() + _MOMENT
