@@ -25,11 +25,11 @@ from pianomime.learn.envs.config import (
         (RewardConfig, {"pedal": -1.0}, "env.reward.pedal must be 0 or more, not -1"),
         (RewardConfig, {"hit": 7.0}, "env.reward.hit must be 0 to 1, not 7"),
         (ActionConfig, {"factor": -0.1}, "env.action.factor must be 0 to 1, not -0.1"),
-        (ObservationConfig, {"goal": -1}, "env.observation.goal must be 0 or more, not -1"),
+        (ObservationConfig, {"goal": -1}, "env.observation.goal must be 0 to 200, not -1"),
         (
             ObservationConfig,
             {"fingertips": -2},
-            "env.observation.fingertips must be 0 or more, not -2",
+            "env.observation.fingertips must be 0 to 200, not -2",
         ),
         (EpisodeConfig, {"frames": -5}, "env.episode.frames must be 0 or more, not -5"),
         (
