@@ -168,7 +168,7 @@ def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):
     columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
     columns["joints"][2] = np.nan
     write_trajectories(tmp_path / "odd.zarr", iter([Episode("odd", 0.0, "ik", columns)]))
-    with pytest.raises(InputError, match="joints of odd"):
+    with pytest.raises(InputError, match="joints of episode 0"):
         train_policy(
             "bc-mse", policy_config("bc-mse"), tmp_path, None, [tmp_path / "odd.zarr"], None
         )
