@@ -71,7 +71,7 @@ def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> 
     assert "neither the folder of a run" in fails(["play", "demo.npz", "--player", "other"], capsys)
     main(["train-expert", "demo.npz", "--method", "search", "-o", "run", *QUICK])
     capsys.readouterr()
-    assert "--start: run plays the excerpt" in fails(
+    assert "--start 1: run plays the excerpt" in fails(
         ["play", "demo.npz", "--player", "run", "--start", "1"], capsys
     )
     assert "not the score" in fails(["play", "ode-to-joy", "--player", "run", "--no-video"], capsys)

@@ -88,8 +88,7 @@ def read_midi(path: Path) -> Score:
         onset=onset[on_piano],
         offset=offset[on_piano],
         velocity=velocity[on_piano],
-        # It may be moved when all notes have ended long ago.
-        pedal=np.minimum(np.concatenate(pedals), MAX_SECONDS),
+        pedal=np.concatenate(pedals),
         title=title_of(path),
         remarks=tuple(remarks),
     )

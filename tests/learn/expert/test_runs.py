@@ -331,7 +331,7 @@ def test_folders_that_hold_something_else(
     with pytest.raises(InputError, match="damaged"):
         load_expert(out)
     about(out, run_version=99)
-    with pytest.raises(InputError, match="version 99; this program reads 2"):
+    with pytest.raises(InputError, match="version 99; this program reads 3"):
         load_expert(out)
     with pytest.raises(InputError, match="not the folder of a run"):
         load_expert(tmp_path)

@@ -259,7 +259,7 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
         train(out, config)
     told = json.loads((out / "run.json").read_text())
     (out / "run.json").write_text(json.dumps({**told, "run_version": 99}))
-    with pytest.raises(InputError, match="version 99; this program reads 2"):
+    with pytest.raises(InputError, match="version 99; this program reads 3"):
         train(out, config)
     for damaged in ("[]", "{", '{"kind": 1}', '{"run_version": 2}', ""):
         (out / "run.json").write_text(damaged)
