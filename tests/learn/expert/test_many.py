@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from pianomime import staging
 from pianomime.errors import InputError
 from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert_run import ExpertRun
@@ -146,12 +147,13 @@ def _raylet(node: Any) -> int:
 
 
 def _runs_being_trained(raylet: int, out: Path) -> list[str]:
-    """Runs whose folder a process of a node holds open: the lock of the one that trains in it."""
+    """Runs whose lock a process of a node holds open: the one that trains in it."""
+    runs = {staging._folder_name(run): run.name for run in out.iterdir()} if out.exists() else {}
     held = []
     for pid in _processes_below(raylet):
         with contextlib.suppress(OSError):  # It may end while it is looked at.
             links = [link.readlink() for link in Path("/proc", str(pid), "fd").iterdir()]
-            held += [target.name for target in links if target.parent == out]
+            held += [runs[link.parent.name] for link in links if link.parent.name in runs]
     return held
 
 
