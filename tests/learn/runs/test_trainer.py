@@ -261,7 +261,7 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
     (out / "run.json").write_text(json.dumps({**told, "run_version": 99}))
     with pytest.raises(InputError, match="version 99; this program reads 3"):
         train(out, config)
-    for damaged in ("[]", "{", '{"kind": 1}', '{"run_version": 2}', ""):
+    for damaged in ("[]", "{", '{"kind": 1}', '{"run_version": 3}', ""):
         (out / "run.json").write_text(damaged)
         with pytest.raises(InputError, match=r"run\.json: damaged"):
             train(out, config)
