@@ -51,6 +51,12 @@ def key_half_sizes() -> np.ndarray:
 
 
 @cache
+def key_levers() -> np.ndarray:
+    """(88,) Distance of each key's front edge from its hinge [m]; read-only."""
+    return _read_only(2.0 * key_half_sizes()[:, 0])
+
+
+@cache
 def key_travel() -> np.ndarray:
     """(88,) Angle of each key at its stop [rad]; 0 is at rest. Read-only."""
     return _read_only(_of_colour("range", 1))
