@@ -9,6 +9,8 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import ArrayLike, NDArray
 
+from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.world.key_sensor import NOTHING, sense, silenced
 from pianomime.world.layout import LAYOUT
 from pianomime.world.model import world_model
 from pianomime.world.parameters import SUBSTEPS
@@ -18,11 +20,14 @@ from pianomime.world.state import (
     STATE,
     PhysicsWarning,
     WorldState,
+    controls_of_frame,
     finite,
+    pressed,
     reset_pose_after_instability,
     starting_positions,
 )
 
+_RECORDED = ("qpos", "qvel")
 _NUMBER = 1  # Batch.warning holds (last info, number of warnings) of each kind.
 
 
@@ -32,6 +37,8 @@ class WorldBatch(WorldState):
     Attributes:
         model: the MuJoCo model, shared by all worlds; read-only.
         pedal: (B,) bool, whether each sustain pedal is down.
+        sounding: (B, 88) bool: keys that sound, as they sense it (see `world.key_sensor`).
+        key_events: note-ons and note-offs of the last step, timed between physics steps.
         blow_ups: (B,) int, number of control steps since each world's last reset in which its
             physics became unstable; it is then recovered as a `World` is.
     """
@@ -54,6 +61,7 @@ class WorldBatch(WorldState):
         # Which bodies sleep is not part of MuJoCo's state, so each world keeps its own data.
         self._batch = Batch(self.model, worlds, threads, persistent=True)
         self.blow_ups = np.zeros(worlds, np.int64)
+        self.sounding = np.zeros((worlds, KEYS), bool)
         self.pedal = np.zeros(worlds, bool)
         self.reset()
 
@@ -77,25 +85,41 @@ class WorldBatch(WorldState):
         self.blow_ups[which] = 0
         self.pedal[which] = False
         self._put(start, which)
+        self._listen(which)
 
     def step(self, ctrl: ArrayLike, pedal: ArrayLike = False) -> None:
-        """Simulate one control step of 0.05 s with constant controls.
+        """Simulate one frame of 0.05 s with constant controls, or with several, each as long.
 
         Args:
-            ctrl: (B, 46) targets of the position actuators, as in `World.step` [rad, m].
+            ctrl: (B, 46) targets of the position actuators, or (B, S, 46), as in `World.step`
+                [rad, m].
             pedal: (B,) bool, or one for all.
 
         Raises:
             ValueError: `ctrl` has another shape or is not finite.
         """
-        targets = finite(ctrl, "ctrl", (len(self), self.model.nu))
+        targets = controls_of_frame(ctrl, len(self), self.model.nu)
         before = self.qpos
-        self._batch.bind("ctrl")[:] = targets
         self.pedal[:] = pedal
         self._keep_pressed_keys_awake()
-        self._batch.step(nstep=SUBSTEPS)
+        moved = np.empty((2, SUBSTEPS + 1, len(self), KEYS))
+        moved[:, 0] = before[:, :KEYS], self._velocities()[:, :KEYS]
+        recorded = self._batch.rollout(
+            SUBSTEPS,
+            np.repeat(targets, SUBSTEPS // targets.shape[1], axis=1),
+            int(mujoco.mjtState.mjSTATE_CTRL),
+            _RECORDED,
+        )
+        for quantity, name in enumerate(_RECORDED):
+            moved[quantity, 1:] = recorded[name][..., :KEYS].swapaxes(0, 1)
         broken = self._broken()
+        lost = np.zeros((len(self), KEYS), bool)
+        lost[broken] = self.sounding[broken]
+        self.sounding[broken] = False
+        moved[:, 1:, broken] = moved[:, :1, broken]
+        self.key_events = sense(moved[0], moved[1], self.sounding)
         if len(broken):
+            self.key_events = self.key_events.followed_by(silenced(lost, FRAME_SECONDS))
             self.blow_ups[broken] += 1
             if not self.quiet:
                 which = ", ".join(map(str, broken))
@@ -124,6 +148,12 @@ class WorldBatch(WorldState):
         self.pedal[which] = False
         self._batch.reset(which, stage=mujoco.mjtStage.mjSTAGE_NONE)
         self._batch.state[which] = given
+        self._listen(which)
+
+    def _listen(self, which: NDArray[np.int64]) -> None:
+        """Let the keys that are pressed sound, without an event."""
+        self.sounding[which] = pressed(self._positions()[which])
+        self.key_events = NOTHING
 
     def _which(self, ids: ArrayLike | None) -> NDArray[np.int64]:
         return np.arange(len(self)) if ids is None else np.asarray(ids, np.int64)

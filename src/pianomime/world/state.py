@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pianomime.keyboard import KEYS
+from pianomime.world.key_sensor import PRESSED_WITHIN, KeyEvents
 from pianomime.world.layout import LAYOUT
-from pianomime.world.parameters import PARAMETERS, key_travel
-
-PRESSED_WITHIN: float = PARAMETERS["keyboard"]["pressed_within"]
-"""[rad] A key this close to its stop counts as pressed (paper, section 4: 0.5 degrees)."""
+from pianomime.world.parameters import SUBSTEPS, key_travel
 
 _DOWN = 0.002
 """[rad] A key turned by more than this must not fall asleep."""
@@ -38,7 +36,15 @@ class PhysicsWarning(RuntimeWarning):
 
 
 class WorldState(ABC):
-    """State readout of one world, or of B worlds, whose shapes then begin with B."""
+    """State readout of one world, or of B worlds, whose shapes then begin with B.
+
+    Attributes:
+        sounding: (..., 88) bool: keys that sound, as they sense it; no part of MuJoCo's state.
+        key_events: what keys did in the last step.
+    """
+
+    sounding: NDArray[np.bool_]
+    key_events: KeyEvents
 
     @property
     def qpos(self) -> NDArray[np.float64]:
@@ -130,6 +136,25 @@ def reset_pose_after_instability(qpos: NDArray[np.float64]) -> NDArray[np.float6
     along = [joints.start + LAYOUT.slide for joints in LAYOUT.joints]
     opened[..., along] = qpos[..., along]
     return opened
+
+
+def controls_of_frame(ctrl: ArrayLike, *shape: int) -> NDArray[np.float64]:
+    """(..., S, 46) The controls of a frame, of which there may be one or several.
+
+    Args:
+        ctrl: (..., 46), or (..., S, 46) with S a divisor of the physics steps of a frame.
+        shape: (..., 46), without S.
+
+    Raises:
+        ValueError: `ctrl` has another shape or is not finite.
+    """
+    given = np.asarray(ctrl, float)
+    if given.ndim != len(shape) + 1:
+        return finite(given, "ctrl", shape)[..., None, :]
+    parts = given.shape[-2]
+    if not parts or SUBSTEPS % parts:
+        raise ValueError(f"a frame of {SUBSTEPS} physics steps cannot have {parts} controls")
+    return finite(given, "ctrl", (*shape[:-1], parts, shape[-1]))
 
 
 def finite(values: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -8,6 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.world.key_sensor import NOTHING, sense, silenced
 from pianomime.world.model import SIDES, fingertip_sites, world_model
 from pianomime.world.parameters import SUBSTEPS
 from pianomime.world.state import (
@@ -16,7 +18,9 @@ from pianomime.world.state import (
     STATE,
     PhysicsWarning,
     WorldState,
+    controls_of_frame,
     finite,
+    pressed,
     reset_pose_after_instability,
     starting_positions,
 )
@@ -29,6 +33,8 @@ class World(WorldState):
         model: the MuJoCo model, shared by all worlds; read-only.
         data: the MuJoCo state.
         pedal: whether the sustain pedal is down.
+        sounding: (88,) bool: keys that sound, as they sense it (see `world.key_sensor`).
+        key_events: note-ons and note-offs of the last step, timed between physics steps.
         blow_ups: number of control steps since the last reset in which the physics became
             unstable. Such a step ends in a recovery pose: forearms along the keyboard where they
             were before the step, hands open above the keys, all keys up. (Wedged fingers left in
@@ -64,31 +70,42 @@ class World(WorldState):
         self.blow_ups = 0
         self.pedal = False
         self._put(start)
+        self._listen()
 
     def step(self, ctrl: ArrayLike, pedal: bool = False) -> None:
-        """Simulate one control step of 0.05 s with a constant control.
+        """Simulate one frame of 0.05 s with a constant control, or with several, each as long.
 
         Warns with `PhysicsWarning` when the physics becomes unstable, unless `quiet`.
 
         Args:
             ctrl: (46,) targets of the position actuators, right 23 then left 23 [rad, m];
-                MuJoCo clamps them to their ranges.
+                MuJoCo clamps them to their ranges. Or (S, 46) to be sent one after the other; S
+                divides the 10 physics steps of a frame.
             pedal: whether the sustain pedal is down.
 
         Raises:
             ValueError: `ctrl` has another shape or is not finite.
         """
-        targets = finite(ctrl, "ctrl", (self.model.nu,))
+        targets = controls_of_frame(ctrl, self.model.nu)
         before = self.data.qpos.copy()
-        self.data.ctrl[:] = targets
         self.pedal = bool(pedal)
         self._keep_pressed_keys_awake()
-        mujoco.mj_step(self.model, self.data, nstep=SUBSTEPS)
+        hold = SUBSTEPS // len(targets)
+        qpos, qvel = self.data.qpos, self.data.qvel
+        moved = np.empty((2, SUBSTEPS + 1, 1, KEYS))
+        moved[:, 0, 0] = qpos[:KEYS], qvel[:KEYS]
+        for substep in range(SUBSTEPS):
+            self.data.ctrl[:] = targets[substep // hold]
+            mujoco.mj_step(self.model, self.data)
+            moved[:, substep + 1, 0] = qpos[:KEYS], qvel[:KEYS]
         if self._broken():
             self.blow_ups += 1
             if not self.quiet:
                 warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=2)
+            self.key_events = silenced(self.sounding[None], FRAME_SECONDS)
             self._put(reset_pose_after_instability(before))
+        else:
+            self.key_events = sense(moved[0], moved[1], self.sounding[None])
 
     def state(self) -> NDArray[np.float64]:
         """(S,) The simulation state, for `set_state` of any World or WorldBatch.
@@ -100,7 +117,7 @@ class World(WorldState):
         return state
 
     def set_state(self, state: ArrayLike) -> None:
-        """Restore a state; the pedal is then up and `blow_ups` is 0.
+        """Restore a state; the pedal is then up, `blow_ups` is 0, and pressed keys sound.
 
         Every World and WorldBatch that restores one state continues alike, bit for bit. The World
         that the state was taken from may continue slightly differently, because keys that slept
@@ -117,6 +134,7 @@ class World(WorldState):
         self.pedal = False
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, given, STATE)
+        self._listen()
 
     def copy(self, quiet: bool = False) -> World:
         """A world in the same state, which continues as this one does, bit for bit.
@@ -127,6 +145,7 @@ class World(WorldState):
         other = World(quiet)
         mujoco.mj_copyData(other.data, self.model, self.data)
         other.blow_ups, other.pedal = self.blow_ups, self.pedal
+        other.sounding, other.key_events = self.sounding.copy(), self.key_events
         return other
 
     @property
@@ -135,6 +154,11 @@ class World(WorldState):
         mujoco.mj_kinematics(self.model, self.data)
         tips: NDArray[np.float64] = self.data.site_xpos[self._tips]
         return tips
+
+    def _listen(self) -> None:
+        """Let the keys that are pressed sound, without an event."""
+        self.sounding = pressed(self.data.qpos)
+        self.key_events = NOTHING
 
     def _positions(self) -> NDArray[np.float64]:
         positions: NDArray[np.float64] = self.data.qpos

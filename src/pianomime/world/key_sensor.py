@@ -1,0 +1,140 @@
+"""What a key senses: when it sounds and falls silent between frames, and how fast it went down.
+
+A real key sounds near the bottom of its way, and sounds again only after it has come back: in a
+grand piano's double escapement until the jack is under the hammer again, in a digital piano until
+its upper contact has opened. Here a key sounds where the paper counts it as pressed (0.5 degrees
+before its stop), and is silent, and ready to sound again, when it has come back to half of its way,
+where a grand piano's damper meets the strings. `docs/concepts/touch.md` names the sources.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.world.parameters import PARAMETERS, PHYSICS_DT, key_half_sizes, key_travel
+
+PRESSED_WITHIN: float = PARAMETERS["keyboard"]["pressed_within"]
+"""[rad] A key this close to its stop counts as pressed (paper, section 4: 0.5 degrees)."""
+
+_SILENT_AT = 0.5
+"""Share of its way to which a key must come back to fall silent."""
+
+
+class KeyEvents(NamedTuple):
+    """What keys did in one step; those of a key are in the order of time.
+
+    Attributes:
+        world: (E,) index of the world; 0 in a `World`.
+        key: (E,) key 0..87.
+        on: (E,) bool: the key began to sound; otherwise it fell silent.
+        time: (E,) when, from the beginning of the step [s].
+        speed: (E,) of the key's front edge, downward, at that time [m/s].
+    """
+
+    world: NDArray[np.int64]
+    key: NDArray[np.int64]
+    on: NDArray[np.bool_]
+    time: NDArray[np.float64]
+    speed: NDArray[np.float64]
+
+    def followed_by(self, others: KeyEvents) -> KeyEvents:
+        """These events, then others."""
+        return KeyEvents(
+            np.append(self.world, others.world),
+            np.append(self.key, others.key),
+            np.append(self.on, others.on),
+            np.append(self.time, others.time),
+            np.append(self.speed, others.speed),
+        )
+
+
+@cache
+def sounds_at() -> NDArray[np.float64]:
+    """(88,) Angle at which each key sounds on its way down [rad]; read-only."""
+    angle: NDArray[np.float64] = key_travel() - PRESSED_WITHIN
+    angle.setflags(write=False)
+    return angle
+
+
+@cache
+def silent_at() -> NDArray[np.float64]:
+    """(88,) Angle at which each key falls silent on its way up [rad]; read-only."""
+    angle: NDArray[np.float64] = _SILENT_AT * key_travel()
+    angle.setflags(write=False)
+    return angle
+
+
+@cache
+def front_edge() -> NDArray[np.float64]:
+    """(88,) Distance of each key's front edge from its hinge [m]; read-only."""
+    length: NDArray[np.float64] = 2.0 * key_half_sizes()[:, 0]
+    length.setflags(write=False)
+    return length
+
+
+def sense(
+    angle: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    sounding: NDArray[np.bool_],
+) -> KeyEvents:
+    """The events of one step, and `sounding` brought up to its end.
+
+    Between two physics steps a key turns evenly, so times are interpolated. Its speed is the
+    greater of those before and after: a key that meets its stop is slowed after it has sounded.
+
+    Args:
+        angle: (n + 1, B, 88) angle of each key before each of n physics steps, and at the end
+            [rad].
+        velocity: (n + 1, B, 88) angular velocity likewise [rad/s].
+        sounding: (B, 88) bool: keys that sound at the beginning; changed in place.
+    """
+    on_angle, off_angle = sounds_at(), silent_at()
+    before, after = angle[:-1], angle[1:]
+    goes_on = (after >= on_angle) & (before < on_angle)
+    goes_off = (after <= off_angle) & (before > off_angle)
+    crossings = np.argwhere((goes_on | goes_off).transpose(1, 2, 0))
+    events: list[tuple[int, int, bool, float, float]] = []
+    for world, key, step in crossings.tolist():
+        on = bool(goes_on[step, world, key])
+        if on == sounding[world, key]:
+            continue
+        sounding[world, key] = on
+        threshold = on_angle[key] if on else off_angle[key]
+        first, last = before[step, world, key], after[step, world, key]
+        share = float((threshold - first) / (last - first))
+        pair = velocity[step : step + 2, world, key]
+        turning = float(pair.max() if on else pair.min())
+        events.append((world, key, on, (step + share) * PHYSICS_DT, turning * front_edge()[key]))
+    return as_events(events)
+
+
+def as_events(events: list[tuple[int, int, bool, float, float]]) -> KeyEvents:
+    """Rows of world, key, on, time and speed as `KeyEvents`."""
+    world, key, on, time, speed = zip(*events, strict=True) if events else ((),) * 5
+    return KeyEvents(
+        np.array(world, np.int64),
+        np.array(key, np.int64),
+        np.array(on, bool),
+        np.array(time, np.float64),
+        np.array(speed, np.float64),
+    )
+
+
+def silenced(sounding: NDArray[np.bool_], time: float) -> KeyEvents:
+    """The events of keys that fall silent because a world was put back, all at one time.
+
+    Args:
+        sounding: (B, 88) bool: keys that sound; changed in place.
+        time: from the beginning of the step [s].
+    """
+    rows = np.argwhere(sounding).tolist()
+    sounding[:] = False
+    return as_events([(world, key, False, time, 0.0) for world, key in rows])
+
+
+NOTHING = as_events([])
+"""The events of a step in which no key did anything."""
