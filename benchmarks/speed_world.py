@@ -123,7 +123,7 @@ def song_controls(name: str) -> Controls:
     from pianomime.songs.find import find_song
 
     score = excerpt(Score.from_midi(find_song(name)))
-    controls: Controls = load_player("zero-shot").play(score).ctrl
+    controls: Controls = load_player("zero-shot").play(score).ctrl[:, 0]
     return controls
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pianomime.keyboard import NO_KEY
-from pianomime.music import Score
+from pianomime.music import Score, notes_from_roll
 from pianomime.plan import FingertipPlan
 from pianomime.players.performance import Performance
 
@@ -56,16 +56,24 @@ def performance(
         if luck > 1 - mistakes / 2:
             key += 1
         pressed[first:stop, key] = True
+    key, on, off = notes_from_roll(pressed)
     return Performance(
         score=score,
         player="made up",
         effort=2,
+        touch="goebl-bresin",
+        works_pedal=False,
         plan=plan(score) if planned else None,
-        ctrl=draw.normal(size=(frames, 46)),
+        ctrl=draw.normal(size=(frames, 1, 46)),
         qpos=draw.normal(size=(frames, 142)),
         key_state=pressed * 0.97,
         pressed=pressed,
         pedal=score.pedal_roll(),
+        event_key=key,
+        event_on=on,
+        event_off=off,
+        event_speed=draw.uniform(0.1, 1.0, len(key)),
+        pedal_times=score.pedal,
         blow_ups=np.array([3], np.int64),
         plan_seconds=0.25,
         simulate_seconds=0.5,

@@ -7,9 +7,9 @@ import pytest
 
 from pianomime import World, WorldBatch
 from pianomime.keyboard import KEYS
-from pianomime.world.key_sensor import front_edge, sense, silent_at, sounds_at
+from pianomime.world.key_sensor import sense, silent_at, sounds_at
 from pianomime.world.layout import LAYOUT
-from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS
+from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS, key_levers
 
 
 def angles(*path: float, key: int = 40) -> tuple[np.ndarray, np.ndarray]:
@@ -27,7 +27,7 @@ def test_a_note_is_timed_between_physics_steps() -> None:
     assert events.key.tolist() == [40]
     assert events.on.tolist() == [True]
     assert events.time[0] == pytest.approx(2.5 * PHYSICS_DT)
-    assert events.speed[0] == pytest.approx(0.4 * sounds_at()[40] / PHYSICS_DT * front_edge()[40])
+    assert events.speed[0] == pytest.approx(0.4 * sounds_at()[40] / PHYSICS_DT * key_levers()[40])
     assert sounding[0].nonzero()[0].tolist() == [40]
 
 

@@ -17,6 +17,7 @@ from pianomime.archive import holds, read_archive, write_arrays
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.music import Score, frame_metrics, notes_from_roll, onset_f1, pedal_f1
+from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.plan.plan_arrays import (
     PLAN_SCHEMA,
@@ -29,28 +30,40 @@ from pianomime.plan.plan_arrays import (
 from pianomime.schema import Field
 from pianomime.short_repr import count, short_repr
 from pianomime.world.layout import LAYOUT
+from pianomime.world.touch import LOUDEST, SOFTEST, TOUCHES
 
-_VELOCITY = 64
-"""Of notes that nobody asked for."""
-
-_VERSION = 3
-"""Of the file; version 2 had no digest."""
+_VERSION = 4
+"""Of the file; version 3 had one control a frame, and neither events nor times of the pedal."""
 _FRAMES = {
-    "ctrl": Field("float", ("T", LAYOUT.ctrl_size)),
+    "ctrl": Field("float", ("T", "S", LAYOUT.ctrl_size)),
     "qpos": Field("float", ("T", LAYOUT.qpos_size)),
     "key_state": Field("float", ("T", KEYS), 0, 1),
     "pressed": Field("bool", ("T", KEYS)),
     "pedal": Field("bool", ("T",)),
     "blow_ups": Field("int", ("B",), 0),
 }
+_EVENTS = {
+    "event_key": Field("int", ("E",), 0, KEYS - 1),
+    "event_on": Field("float", ("E",), 0, MAX_SECONDS),
+    "event_off": Field("float", ("E",), 0, MAX_SECONDS),
+    "event_speed": Field("float", ("E",)),
+    "pedal_times": Field("float", ("Q", 2), 0, MAX_SECONDS),
+}
 _MARK = "key_state"
 """An array that other files do not hold."""
 _SECONDS = {name: Field("float", (), 0) for name in ("plan_seconds", "simulate_seconds")}
-_PLAYER = {"player": Field("text"), "effort": Field("int", (), 0)}
+_PLAYER = {
+    "player": Field("text"),
+    "effort": Field("int", (), 0),
+    "touch": Field("text", choices=tuple(TOUCHES)),
+    "works_pedal": Field("bool", ()),
+}
 _SCHEMA = {
     **_PLAYER,
     **SCORE_SCHEMA,
     **_FRAMES,
+    **_EVENTS,
+    "event_velocity": Field("int", ("E",), SOFTEST, LOUDEST),
     **_SECONDS,
     **{name: replace(field, optional=True) for name, field in PLAN_SCHEMA.items()},
 }
@@ -58,18 +71,25 @@ _SCHEMA = {
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """A played song, one row for each 0.05 s frame.
+    """A played song: T frames of 0.05 s, and E notes that sounded, at their own times.
 
     Attributes:
         score: what was to be played.
         player: name of the player.
         effort: how hard the player tried, 0 to 3.
         plan: the fingertip plan, None for players that have none.
-        ctrl: (T, 46) controls, RIGHT 23 then LEFT 23 [rad, m].
+        touch: name of the map from the speed of a key to MIDI velocity.
+        works_pedal: whether the player works the pedal; otherwise the score does.
+        ctrl: (T, S, 46) controls, S in each frame, RIGHT 23 then LEFT 23 [rad, m].
         qpos: (T, 142) all joint positions after each frame: 88 keys, RIGHT 27, LEFT 27 [rad, m].
         key_state: (T, 88) 0..1 of the way down, after each frame.
         pressed: (T, 88) bool, after each frame; to be compared with `score.roll()`.
         pedal: (T,) bool.
+        event_key: (E,) key of each note that sounded, in the order of `event_on`.
+        event_on, event_off: (E,) when its key began to sound and fell silent [s from the first
+            frame]; a key that is down at the end is silent then.
+        event_speed: (E,) speed of the key's front edge where it began to sound [m/s].
+        pedal_times: (Q, 2) when the pedal was down, as in a `Score` [s].
         blow_ups: frames in which the physics broke and the world had to be put back.
         plan_seconds, simulate_seconds: how long planning, and tracking with simulating, took.
     """
@@ -77,12 +97,19 @@ class Performance:
     score: Score
     player: str
     effort: int
+    touch: str
+    works_pedal: bool
     plan: FingertipPlan | None
     ctrl: NDArray[np.float64]
     qpos: NDArray[np.float64]
     key_state: NDArray[np.float64]
     pressed: NDArray[np.bool_]
     pedal: NDArray[np.bool_]
+    event_key: NDArray[np.int64]
+    event_on: NDArray[np.float64]
+    event_off: NDArray[np.float64]
+    event_speed: NDArray[np.float64]
+    pedal_times: NDArray[np.float64]
     blow_ups: NDArray[np.int64]
     plan_seconds: float
     simulate_seconds: float
@@ -96,8 +123,14 @@ class Performance:
         frames = self.score.frames()
         for name, field in _FRAMES.items():
             shape, wanted = getattr(self, name).shape, (frames, *field.shape[1:])
+            if name == "ctrl":
+                wanted = (frames, shape[1] if len(shape) == 3 else 1, LAYOUT.ctrl_size)
             if name != "blow_ups" and shape != wanted:
                 raise ValueError(f"{name} has shape {shape}, not {wanted}")
+        if self.touch not in TOUCHES:
+            raise ValueError(f"there is no touch {self.touch!r}; there are {', '.join(TOUCHES)}")
+        if not (self.event_on < self.event_off).all():
+            raise ValueError("an event ends before it begins")
         if not ((self.blow_ups >= 0) & (self.blow_ups < frames)).all():
             raise ValueError(f"blow_ups must be frames 0..{frames - 1}")
         if self.plan is not None:
@@ -137,43 +170,42 @@ class Performance:
         """Number of notes that the planner left out."""
         return 0 if self.plan is None else self.plan.dropped
 
-    def played(self) -> Score:
-        """What was played, as a Score: notes from the pressed keys, pedal from the score.
+    @property
+    def event_velocity(self) -> NDArray[np.int64]:
+        """(E,) MIDI velocity of each note, 1 to 127, from the speed of its key."""
+        return TOUCHES[self.touch].velocity_of(self.event_speed, self.event_key)
 
-        The simulated piano does not sense how hard a key is struck, so a note that was wanted
-        has the velocity that the score asks for.
-        """
-        key, onset, offset = notes_from_roll(self.pressed)
-        asked = np.zeros(self.pressed.shape, np.uint8)
-        for note, (first, stop) in enumerate(self.score.note_frames()):
-            asked[first:stop, self.score.key[note]] = self.score.velocity[note]
-        velocity = np.full(len(key), _VELOCITY)
-        for note, (first, stop) in enumerate(_frames(onset, offset)):
-            heard = asked[first:stop, key[note]]
-            if heard.any():
-                velocity[note] = heard[heard > 0][0]
-        edges = np.flatnonzero(np.diff(np.pad(self.pedal, 1).astype(np.int8)))
-        pedal = edges.reshape(-1, 2) / FRAME_RATE
-        return Score(key, onset, offset, velocity, pedal, self.score.title)
+    def played(self) -> Score:
+        """What was played, as a Score: what the keys sensed, and the pedal."""
+        return Score(
+            key=self.event_key,
+            onset=self.event_on,
+            offset=self.event_off,
+            velocity=self.event_velocity,
+            pedal=self.pedal_times,
+            title=self.score.title,
+        )
 
     def metrics(self) -> dict[str, float]:
         """How well it was played, each 0..1.
 
         Returns:
-            `precision`, `recall` and `f1`, frame by frame; `onset_f1`, note onsets within 50 ms;
-            `pedal_f1`.
+            `precision`, `recall` and `f1`, frame by frame; `onset_f1`, note onsets within 50 ms, at
+            20 Hz; `pedal_f1`, where the player works the pedal.
         """
         wanted = self.score.roll()
         frames = frame_metrics(wanted, self.pressed)
-        return {
+        metrics = {
             "precision": frames.precision,
             "recall": frames.recall,
             "f1": frames.f1,
             "onset_f1": onset_f1(
                 (self.score.key, self.score.onset), notes_from_roll(self.pressed)[:2]
             ),
-            "pedal_f1": pedal_f1(self.score.pedal_roll(), self.pedal),
         }
+        if self.works_pedal:
+            metrics["pedal_f1"] = pedal_f1(self.score.pedal_roll(), self.pedal)
+        return metrics
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write everything to one .npz file, whole or not at all.
@@ -182,7 +214,7 @@ class Performance:
             path: where to; its folder must exist.
         """
         arrays: dict[str, NDArray[Any]] = {"version": np.array(_VERSION)}
-        for name in (*_PLAYER, *_FRAMES, *_SECONDS):
+        for name in (*_PLAYER, *_FRAMES, *_EVENTS, "event_velocity", *_SECONDS):
             arrays[name] = np.asarray(getattr(self, name))
         arrays |= score_arrays(self.score)
         if self.plan is not None:
@@ -213,8 +245,10 @@ class Performance:
             score=score_of(arrays),
             player=str(arrays["player"]),
             effort=int(arrays["effort"]),
+            touch=str(arrays["touch"]),
+            works_pedal=bool(arrays["works_pedal"]),
             plan=plan_of(arrays) if all(planned) else None,
-            **{name: arrays[name] for name in _FRAMES},
+            **{name: arrays[name] for name in (*_FRAMES, *_EVENTS)},
             plan_seconds=float(arrays["plan_seconds"]),
             simulate_seconds=float(arrays["simulate_seconds"]),
         )
@@ -223,8 +257,3 @@ class Performance:
 def is_performance(path: str | os.PathLike[str]) -> bool:
     """Whether a file is a performance, of any version, rather than other arrays."""
     return holds(path, _MARK)
-
-
-def _frames(onset: NDArray[np.float64], offset: NDArray[np.float64]) -> NDArray[np.int64]:
-    """(N, 2) first frame and one past the last of notes that begin and end with a frame."""
-    return np.rint(np.stack([onset, offset], axis=1) * FRAME_RATE).astype(np.int64)

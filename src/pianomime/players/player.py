@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pianomime.keyboard import KEYS
+from pianomime.keyboard import FRAME_RATE, FRAME_SECONDS, KEYS
 from pianomime.music import Score
 from pianomime.plan import Planner
 from pianomime.players.performance import Performance
 from pianomime.players.rollout import rollout
 from pianomime.progress import Progress, no_progress, telling
 from pianomime.short_repr import short_repr
-from pianomime.track import Controller, Tracker
+from pianomime.track import Controller, PedalController, Tracker
 from pianomime.world import World
+from pianomime.world.key_sensor import KeyEvents
 from pianomime.world.layout import LAYOUT
+from pianomime.world.parameters import PHYSICS_DT
+from pianomime.world.touch import DEFAULT_TOUCH
 
 
 class Player(ABC):
@@ -30,11 +36,14 @@ class Player(ABC):
         effort: how hard it tries, 0 to 3; 0 for a player that does not search.
         excerpt: start and length [s] of the only excerpt that it can play, as an expert of one
             song; None for a player of any.
+        touch: name of the map from the speed of a key to MIDI velocity, as in
+            `pianomime.world.touch.TOUCHES`.
     """
 
     name: str
     effort: int = 0
     excerpt: tuple[float, float] | None = None
+    touch: str = DEFAULT_TOUCH
 
     @abstractmethod
     def start(self, score: Score) -> Controller:
@@ -69,34 +78,76 @@ class Player(ABC):
         planned = time.perf_counter()
 
         frames = score.frames()
-        ctrl = np.empty((frames, LAYOUT.ctrl_size))
+        ctrl = []
         qpos = np.empty((frames, LAYOUT.qpos_size))
         key_state = np.empty((frames, KEYS))
         pressed = np.empty((frames, KEYS), bool)
         pedal = np.empty(frames, bool)
         blow_ups = np.zeros(frames, np.int64)
-        world = World()
+        world, notes = World(), _SoundingNotes()
         for step in rollout(controller, world, score.pedal_roll()):
             frame = step.frame
-            ctrl[frame], pedal[frame] = step.ctrl, step.pedal
+            ctrl.append(np.atleast_2d(step.ctrl))
+            pedal[frame] = step.pedal
+            notes.add(world.key_events, frame * FRAME_SECONDS)
             qpos[frame], key_state[frame] = world.qpos, world.key_state
             pressed[frame] = world.pressed
             blow_ups[frame] = world.blow_ups
             progress("playing", frame + 1, frames)
+        works_pedal = isinstance(controller, PedalController)
         return Performance(
             score=score,
             player=self.name,
             effort=self.effort,
+            touch=self.touch,
+            works_pedal=works_pedal,
             plan=controller.plan,
-            ctrl=ctrl,
+            ctrl=np.array(ctrl),
             qpos=qpos,
             key_state=key_state,
             pressed=pressed,
             pedal=pedal,
+            pedal_times=_intervals(pedal) if works_pedal else score.pedal,
+            **notes.arrays(frames * FRAME_SECONDS),
             blow_ups=np.flatnonzero(np.diff(blow_ups, prepend=0)),
             plan_seconds=planned - began,
             simulate_seconds=time.perf_counter() - planned,
         )
+
+
+class _SoundingNotes:
+    """Makes notes of what keys sense, frame after frame."""
+
+    def __init__(self) -> None:
+        self._notes: list[list[float]] = []  # key, on, off, speed
+        self._last: dict[int, list[float]] = {}  # of each key
+
+    def add(self, events: KeyEvents, begin: float) -> None:
+        """Add the events of a frame that begins at a time [s]."""
+        for _, key, on, after, speed in zip(*map(np.ndarray.tolist, events), strict=True):
+            if on:
+                self._last[key] = [key, begin + after, math.inf, speed]
+                self._notes.append(self._last[key])
+            else:
+                self._last[key][2] = begin + after
+
+    def arrays(self, end: float) -> dict[str, NDArray[Any]]:
+        """The events of a `Performance` that ends at a time [s]."""
+        notes = np.array(sorted(self._notes, key=lambda note: note[1])).reshape(-1, 4)
+        key, on, off, speed = notes.T
+        # A key that sounds in the very last moment lasts a moment.
+        return {
+            "event_key": key.astype(np.int64),
+            "event_on": on,
+            "event_off": np.maximum(np.minimum(off, end), on + PHYSICS_DT),
+            "event_speed": speed,
+        }
+
+
+def _intervals(pedal: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(P, 2) When the pedal is down [s], of its frames (T,)."""
+    edges = np.flatnonzero(np.diff(np.pad(pedal, 1).astype(np.int8)))
+    return edges.reshape(-1, 2) / FRAME_RATE
 
 
 @dataclass(frozen=True)
@@ -108,7 +159,7 @@ class PlannedPlayer(Player):
         planner: makes a FingertipPlan of a Score.
         tracker: makes a Controller of the plan.
         effort: how hard it tries, 0 to 3.
-        excerpt: see `Player`.
+        excerpt, touch: see `Player`.
     """
 
     name: str
@@ -116,6 +167,7 @@ class PlannedPlayer(Player):
     tracker: Tracker
     effort: int = 0
     excerpt: tuple[float, float] | None = None
+    touch: str = DEFAULT_TOUCH
 
     def __repr__(self) -> str:
         return short_repr(self, repr(self.name), f"effort {self.effort}")

@@ -17,7 +17,8 @@ class Step(NamedTuple):
 
     Attributes:
         frame: its number.
-        ctrl: (46,) the control that was held in it, right then left [rad, m].
+        ctrl: (46,) the control that was held in it, or (S, 46) those that followed one another,
+            right then left [rad, m].
         pedal: whether the sustain pedal was down.
     """
 

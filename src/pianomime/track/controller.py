@@ -40,7 +40,8 @@ class Controller(Protocol):
             world: as it is before the frame; it must not be changed.
 
         Returns:
-            (46,) targets of the position actuators, right then left hand [rad, m].
+            (46,) targets of the position actuators, right then left hand [rad, m]; or (S, 46),
+            which follow one another within the frame, as many in every frame.
         """
         ...
 

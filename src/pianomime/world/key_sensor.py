@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.world.parameters import PARAMETERS, PHYSICS_DT, key_half_sizes, key_travel
+from pianomime.world.parameters import PARAMETERS, PHYSICS_DT, key_levers, key_travel
 
 PRESSED_WITHIN: float = PARAMETERS["keyboard"]["pressed_within"]
 """[rad] A key this close to its stop counts as pressed (paper, section 4: 0.5 degrees)."""
@@ -68,14 +68,6 @@ def silent_at() -> NDArray[np.float64]:
     return angle
 
 
-@cache
-def front_edge() -> NDArray[np.float64]:
-    """(88,) Distance of each key's front edge from its hinge [m]; read-only."""
-    length: NDArray[np.float64] = 2.0 * key_half_sizes()[:, 0]
-    length.setflags(write=False)
-    return length
-
-
 def sense(
     angle: NDArray[np.float64],
     velocity: NDArray[np.float64],
@@ -108,7 +100,7 @@ def sense(
         share = float((threshold - first) / (last - first))
         pair = velocity[step : step + 2, world, key]
         turning = float(pair.max() if on else pair.min())
-        events.append((world, key, on, (step + share) * PHYSICS_DT, turning * front_edge()[key]))
+        events.append((world, key, on, (step + share) * PHYSICS_DT, turning * key_levers()[key]))
     return as_events(events)
 
 

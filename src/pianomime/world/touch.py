@@ -141,7 +141,9 @@ class AngularTouch:
 
 
 TOUCHES: dict[str, Touch] = {"goebl-bresin": HammerTouch(), "cantabile": AngularTouch()}
-"""The maps by name; the first is the default."""
+"""The maps by name."""
+DEFAULT_TOUCH = "goebl-bresin"
+"""What players aim at and are heard with, unless told otherwise."""
 
 
 def _speeds(speed: ArrayLike, key: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -34,9 +34,9 @@ from pianomime.schema import MOST_BYTES, Field
 from pianomime.shown import shown
 from pianomime.track import IkTracker
 from pianomime.video.hands.repair import at_rest, outliers
+from pianomime.world.key_sensor import PRESSED_WITHIN
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT, POINTS_SIZE
 from pianomime.world.parameters import key_centres, key_travel
-from pianomime.world.state import PRESSED_WITHIN
 
 if TYPE_CHECKING:
     from pianomime.learn.data.episode import Episode

@@ -55,7 +55,7 @@ def search_trajectory(run: ExpertRun, threads: int, progress: Progress) -> None:
             steps += player.steps + len(played)
             made = Evaluation(steps, **_scores(played))
             if made.f1 > max((one.f1 for one in curve), default=-1.0):
-                ctrl = played.ctrl
+                ctrl = played.ctrl[:, 0]
                 run.keep_best({"ctrl": ctrl}, made)
             assert ctrl is not None
             curve.append(made)
