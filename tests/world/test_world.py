@@ -287,3 +287,20 @@ def test_black_and_white_keys_both_sound() -> None:
     qpos[:KEYS][BLACK] = key_travel()[BLACK]
     world.reset(qpos)
     np.testing.assert_array_equal(world.pressed, BLACK)
+
+
+def test_every_physics_step_can_be_watched(song_controls: NDArray[np.float64]) -> None:
+    watched, plain = World(), World()
+    times: list[float] = []
+    seen: list[NDArray[np.float64]] = []
+
+    def watch() -> None:
+        times.append(float(watched.data.time))
+        seen.append(everything(watched))
+
+    for ctrl in song_controls[:20]:
+        watched.step(ctrl, watch=watch)
+        plain.step(ctrl)
+        np.testing.assert_array_equal(seen[-1], everything(plain))
+    np.testing.assert_allclose(times, 0.005 * np.arange(1, 201))
+    assert len({row.tobytes() for row in seen}) == len(seen)

@@ -53,6 +53,14 @@ def build_spec() -> mujoco.MjSpec:
     return spec
 
 
+def hands_spec() -> mujoco.MjSpec:
+    """The spec of both hands without the piano, in the order of `build_spec`."""
+    spec = _empty_spec()
+    add_hand(spec, "rh")
+    add_hand(spec, "lh")
+    return spec
+
+
 @cache
 def world_model() -> mujoco.MjModel:
     """The compiled model of `build_spec`, compiled once; treat it as read-only."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -72,7 +73,9 @@ class World(WorldState):
         self._put(start)
         self._listen()
 
-    def step(self, ctrl: ArrayLike, pedal: bool = False) -> None:
+    def step(
+        self, ctrl: ArrayLike, pedal: bool = False, watch: Callable[[], None] | None = None
+    ) -> None:
         """Simulate one frame of 0.05 s with a constant control, or with several, each as long.
 
         Warns with `PhysicsWarning` when the physics becomes unstable, unless `quiet`.
@@ -82,6 +85,7 @@ class World(WorldState):
                 MuJoCo clamps them to their ranges. Or (S, 46) to be sent one after the other; S
                 divides the 10 physics steps of a frame.
             pedal: whether the sustain pedal is down.
+            watch: called after each of the 10 physics steps, to read `data`.
 
         Raises:
             ValueError: `ctrl` has another shape or is not finite.
@@ -98,6 +102,8 @@ class World(WorldState):
             self.data.ctrl[:] = targets[substep // hold]
             mujoco.mj_step(self.model, self.data)
             moved[:, substep + 1, 0] = qpos[:KEYS], qvel[:KEYS]
+            if watch is not None:
+                watch()
         if self._broken():
             self.blow_ups += 1
             if not self.quiet:
