@@ -237,8 +237,8 @@ def test_a_signal_stops_in_one_line_and_leaves_nothing_half_done(
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     began = time.monotonic()
-    # Its temporary folder, or that of its songs, shows that it is at work.
-    while not any(tmp_path.glob(".pianomime-*/out/*")) and not out.exists():
+    # Its hidden folder, or that of its songs, shows that it is at work.
+    while not any(tmp_path.glob(".pianomime-*")) and not out.exists():
         assert process.poll() is None, process.stderr and process.stderr.read()
         assert time.monotonic() < began + 60
         time.sleep(0.02)

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pianomime.errors import InputError
 from pianomime.staging import claim, hold, is_staging, scratch, sweep
+from pianomime.stop import Stopped, stoppable
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such locks")
 
@@ -116,6 +120,58 @@ def test_nothing_is_left_of_a_writer_that_fails(
     with pytest.raises(error):
         fail()
     assert [*tmp_path.iterdir()] == []
+
+
+def _signalling(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function during which SIGTERM arrives, the first time."""
+    times = iter([signal.SIGTERM])
+
+    def call(*arguments: Any, **named: Any) -> Any:
+        for number in times:
+            signal.raise_signal(number)
+        return function(*arguments, **named)
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("owner", "name"),
+    [(os, "open"), (os.path, "samestat"), (shutil, "rmtree"), (Path, "unlink"), (Path, "rmdir")],
+)
+def test_nothing_is_left_by_a_signal_while_a_folder_is_taken_or_removed(
+    owner: Any, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    received: list[int] = []
+    with stoppable(received), monkeypatch.context() as patched:
+        patched.setattr(owner, name, _signalling(getattr(owner, name)))
+        with pytest.raises(Stopped), claim(tmp_path / "out") as folder:
+            (folder / "half").touch()
+    assert received == [signal.SIGTERM]
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_a_sweep_that_is_stopped_leaves_no_folder_half_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dead = tmp_path / (".pianomime-" + 16 * "0")
+    (dead / "out" / "deep").mkdir(parents=True)
+    with stoppable([]), monkeypatch.context() as patched:
+        patched.setattr(shutil, "rmtree", _signalling(shutil.rmtree))
+        with pytest.raises(Stopped):
+            sweep(tmp_path)
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_who_waits_for_another_writer_is_stopped_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    with writer(out), stoppable([]):
+        monkeypatch.setattr(time, "sleep", _signalling(time.sleep))
+        with pytest.raises(Stopped), claim(out, 60.0):
+            pass
+        (folder,) = _hidden(tmp_path)
+        assert (folder / "out" / "half").exists()
 
 
 def test_temporary_files_are_private_and_each_has_its_own(

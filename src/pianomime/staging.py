@@ -22,6 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pianomime.errors import InputError
+from pianomime.stop import deferred
 
 _NAME = re.compile(r"\.pianomime-[0-9a-f]{16}")
 """Names of our folders."""
@@ -53,18 +54,26 @@ def claim(path: Path, patience: float = _PATIENCE) -> Iterator[Path]:
     absolute = Path(os.path.realpath(path) if path.is_dir() else os.path.abspath(path))
     folder = _home(absolute) / _folder_name(absolute)
     deadline = time.monotonic() + patience
-    while (lock := _taken(folder)) is None:
-        if time.monotonic() > deadline:
-            raise InputError(f"{path}: another process is writing it")
-        time.sleep(_PAUSE)
+    lock = None
     try:
+        while True:
+            # A signal must find either no folder or one that is cleared away below; but while
+            # this waits for another writer, it stops at once.
+            with deferred():
+                lock = _taken(folder)
+            if lock is not None:
+                break
+            if time.monotonic() > deadline:
+                raise InputError(f"{path}: another process is writing it")
+            time.sleep(_PAUSE)
         inside = folder / _INSIDE
         shutil.rmtree(inside, ignore_errors=True)
         # Not the folder itself, which only the user may read: this one has the umask's permissions.
         inside.mkdir()
         yield inside
     finally:
-        _removed(folder, lock)
+        if lock is not None:
+            _removed(folder, lock)
 
 
 @contextlib.contextmanager
@@ -107,7 +116,7 @@ def sweep(home: Path) -> None:
         return
     for folder in _ours(home):
         # One of another user, or one that is gone meanwhile.
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), deferred():
             lock = _taken(folder)
             if lock is not None:
                 _removed(folder, lock)
@@ -182,14 +191,18 @@ def _taken(folder: Path) -> int | None:
 
 
 def _removed(folder: Path, lock: int) -> None:
-    """Remove a folder of ours while it is locked, then let go of it."""
-    try:
-        shutil.rmtree(folder / _INSIDE, ignore_errors=True)
-        if sys.platform == "win32":  # It cannot remove what is open.
-            shutil.rmtree(folder, ignore_errors=True)
-        else:
-            with contextlib.suppress(OSError):
-                (folder / _LOCK).unlink()
-                folder.rmdir()
-    finally:
-        os.close(lock)
+    """Remove a folder of ours while it is locked, then let go of it.
+
+    A signal waits until that is done.
+    """
+    with deferred():
+        try:
+            shutil.rmtree(folder / _INSIDE, ignore_errors=True)
+            if sys.platform == "win32":  # It cannot remove what is open.
+                shutil.rmtree(folder, ignore_errors=True)
+            else:
+                with contextlib.suppress(OSError):
+                    (folder / _LOCK).unlink()
+                    folder.rmdir()
+        finally:
+            os.close(lock)

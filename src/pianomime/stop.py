@@ -2,7 +2,7 @@
 
 Each raises an exception in the main thread, so that whatever is being written is cleared away and
 child processes are ended. A signal that the process was told to ignore, as by `nohup`, stays
-ignored.
+ignored. A few lines that belong together can have it deferred until they are done.
 """
 
 from __future__ import annotations
@@ -25,6 +25,21 @@ class Stopped(KeyboardInterrupt):
     """A signal has asked this process to end; whatever lets Ctrl-C through lets it through."""
 
 
+class _Deferral:
+    """What `deferred` and the handler of `stoppable` know of each other; of the main thread alone.
+
+    Attributes:
+        blocks: how many of `deferred` that thread is in.
+        number: of the signal that arrived in them; 0 if none has.
+    """
+
+    blocks: int = 0
+    number: int = 0
+
+
+_deferral = _Deferral()
+
+
 @contextmanager
 def stoppable(received: list[int], last: bool = False) -> Iterator[None]:
     """Have signals raise `Stopped` in the main thread, whose context this is.
@@ -43,9 +58,11 @@ def stoppable(received: list[int], last: bool = False) -> Iterator[None]:
 
     def stop(number: int, _: FrameType | None) -> None:
         # Once is enough: clearing away goes on. But a person may insist.
-        again = bool(received) and number != signal.SIGINT
+        first, insists = not received, number == signal.SIGINT
         received.append(number)
-        if not again:
+        if first and _deferral.blocks:
+            _deferral.number = number
+        elif first or insists:
             raise Stopped(number)
 
     report = sys.unraisablehook
@@ -73,3 +90,27 @@ def stoppable(received: list[int], last: bool = False) -> Iterator[None]:
         for number, handler in before.items():
             signal.signal(number, signal.SIG_DFL if last else handler)
         sys.unraisablehook = report
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """Have the signal that stops raise `Stopped` when this block is left, not within it.
+
+    For lines that are done in a moment and of which none may be done without the others. Who
+    insists, by Ctrl-C after another signal, need not wait for their end. Where nothing is
+    `stoppable`, and in other threads than the main one, this does nothing.
+
+    Raises:
+        Stopped: a signal has arrived in the block; in place of what the block itself raised.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _deferral.blocks += 1
+    try:
+        yield
+    finally:
+        _deferral.blocks -= 1
+        if _deferral.number and not _deferral.blocks:
+            number, _deferral.number = _deferral.number, 0
+            raise Stopped(number)
