@@ -48,6 +48,9 @@ ALLOWED = {
     ("plan/hand_path.py", "slide_acceleration=20.0"),
     # Times that have nothing to do with frames [s].
     ("music/metrics.py", "ONSET_TOLERANCE = 0.05"),
+    ("music/protocol.py", "onset_tolerances: tuple[float, ...] = (0.050"),
+    ("music/protocol.py", "offset_least: float = 0.050"),
+    ("music/protocol.py", "pedal: float = 0.050"),
     ("songs/notation.py", "RELEASE = 0.05"),
     ("commands/progress.py", "_LINE_SECONDS = 30.0"),
     # Shares, probabilities and costs.
