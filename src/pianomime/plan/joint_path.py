@@ -101,6 +101,8 @@ def smooth_path(
     clearance: NDArray[np.float64],
     config: PathConfig | None = None,
     advance: Callable[[int], None] = ignore,
+    dt: float = FRAME_SECONDS,
+    guess: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Optimise the joint positions of one hand at the end of each of T frames.
 
@@ -114,19 +116,26 @@ def smooth_path(
             that may go down.
         config: weights of the other terms.
         advance: called with a number of frames as they are done, `iterations` times T in all.
+        dt: length of a frame [s]. Tracking errors are as given; all other terms count for the time
+            that they last, so that a path of shorter frames is the same path.
+        guess: (T, 27) path to begin with [rad, m]; None for the home pose along the targets.
 
     Returns:
         (T + 1, 27) joint positions [rad, m]; the first row is `start`.
     """
     config = config or PathConfig()
     frames = len(targets)
-    posture = _posture_weights(config)
-    coupling = _coupling_hessian(config)
-    stiffness = _acceleration_weights(config)
+    lasts = dt / FRAME_SECONDS
+    posture = _posture_weights(config) * lasts
+    coupling = _coupling_hessian(config) * lasts
+    stiffness = _acceleration_weights(config, dt) * lasts
     home = np.clip(HOME, hand.low, hand.high)
-    path = np.tile(home, (frames, 1))
-    path[:, LAYOUT.slide] = _slide_guess(hand, targets, weights)
-    everywhere = np.diag(posture + config.damping**-2) + coupling
+    if guess is None:
+        path = np.tile(home, (frames, 1))
+        path[:, LAYOUT.slide] = _slide_guess(hand, targets, weights)
+    else:
+        path = np.clip(guess, hand.low, hand.high)
+    everywhere = np.diag(posture + config.damping**-2 * lasts) + coupling
     blocks = np.empty((frames, len(_STORED)))
     for _ in range(config.iterations):
         gradient = np.empty((frames, LAYOUT.hand_joints))
@@ -156,19 +165,23 @@ def _tracking_terms(
     config: PathConfig,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Hessian (T, 27, 27) and gradient (T, 27) of the squared errors of the points of a hand."""
+    points = np.empty(targets.shape)
+    jacobian = np.empty((*targets.shape, LAYOUT.hand_joints))
+    for frame, pose in enumerate(path):
+        points[frame], jacobian[frame] = hand.points_and_jacobian(pose)
+    error = (points - targets) * weights
+    rows = jacobian * weights[..., None]
+    height = points[:, 1:, 2] - clearance - resting_height(points[:, 1:, 0])
+    below = height < 0.0
+    error[:, 1:, 2][below] = height[below] / config.floor
+    rows[:, 1:, 2][below] = jacobian[:, 1:, 2][below] / config.floor
+    rows = rows.reshape(len(path), -1, LAYOUT.hand_joints)
+    error = error.reshape(len(path), -1)
     gradient = np.empty((len(path), LAYOUT.hand_joints))
     blocks = np.empty((len(path), LAYOUT.hand_joints, LAYOUT.hand_joints))
-    for frame, pose in enumerate(path):
-        points, jacobian = hand.points_and_jacobian(pose)
-        error = (points - targets[frame]) * weights[frame]
-        rows = jacobian * weights[frame][..., None]
-        height = points[1:, 2] - clearance[frame] - resting_height(points[1:, 0])
-        below = height < 0.0
-        error[1:, 2][below] = height[below] / config.floor
-        rows[1:, 2][below] = jacobian[1:, 2][below] / config.floor
-        rows = rows.reshape(-1, LAYOUT.hand_joints)
-        blocks[frame] = rows.T @ rows
-        gradient[frame] = rows.T @ error.ravel()
+    for frame, row in enumerate(rows):
+        blocks[frame] = row.T @ row
+        gradient[frame] = row.T @ error[frame]
     return blocks, gradient
 
 
@@ -223,11 +236,11 @@ def _slide_guess(
     return guess
 
 
-def _acceleration_weights(config: PathConfig) -> NDArray[np.float64]:
+def _acceleration_weights(config: PathConfig, dt: float) -> NDArray[np.float64]:
     """(27,) Weight of each joint's squared second difference between frames."""
     acceleration = np.full(LAYOUT.hand_joints, config.joint_acceleration)
     acceleration[LAYOUT.slides] = config.slide_acceleration
-    weights: NDArray[np.float64] = (acceleration * FRAME_SECONDS**2) ** -2
+    weights: NDArray[np.float64] = (acceleration * dt**2) ** -2
     return weights
 
 
