@@ -30,7 +30,7 @@ _END = 1e-9
 _UPPER = 99.0
 """Percentile that stands for the upper end of speeds, in place of the one fastest instant."""
 
-HUMAN = {"wrist_speed_p99": 0.9, "wrist_jerk": 48.0, "fingertip_jerk": 77.0}
+HUMAN = {"wrist_speed_p99": 0.90, "wrist_jerk": 48.0, "fingertip_jerk": 76.7}
 """The same of human demonstrations, measured by `benchmarks/body.py`."""
 
 
