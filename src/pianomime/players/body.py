@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE, KEYS
-from pianomime.players.motion import Motion, motion
+from pianomime.players.motion import motion
 from pianomime.players.performance import Performance
 from pianomime.world.hand import hand_points
 from pianomime.world.layout import LAYOUT
@@ -29,6 +29,13 @@ _END = 1e-9
 """Share of an actuator's range within which a control is at its end."""
 _UPPER = 99.0
 """Percentile that stands for the upper end of speeds, in place of the one fastest instant."""
+
+_OF_MOTION = (
+    *("joint_speed_p99", "joint_speed_max", "joints_fast"),
+    *("rail_speed_max", "rail_acceleration_max", "rail_force_max"),
+    *("forces_at_limit", "forces_at_limit_worst"),
+)
+"""Metrics of what is between frames."""
 
 HUMAN = {"wrist_speed_p99": 0.90, "wrist_jerk": 48.0, "fingertip_jerk": 76.7}
 """The same of human demonstrations, measured by `benchmarks/body.py`."""
@@ -46,9 +53,9 @@ class BodyMetrics:
         fingers_overlap: share of frames in which two fingers of one hand are, likewise.
         fingers_overlap_max: the deepest [m].
         forearms_crossed: share of frames in which the left wrist is to the right of the right one.
-        joint_speed_p99: of the joints of wrists and fingers, over all joints and instants [rad/s].
+        joint_speed_p99: of the fastest joint of wrists and fingers in each instant [rad/s].
         joint_speed_max: the greatest [rad/s].
-        joints_fast: share of instants in which one of these is faster than 10 rad/s.
+        joints_fast: share of instants in which it is over 10 rad/s.
         rail_speed_max: of the three slides of both forearms [m/s].
         rail_acceleration_max: of these, from one instant to the next [m/s^2].
         rail_force_max: of their actuators [N].
@@ -95,7 +102,7 @@ def body_metrics(performance: Performance) -> BodyMetrics:
     found = {
         **_of_poses(performance.qpos[:, KEYS:], whole),
         **_of_controls(performance.ctrl),
-        **_of_motion(motion(performance), whole),
+        **_of_motion(performance, whole),
     }
     invalid = tuple(
         name for name, value in found.items() if value is not None and not np.isfinite(value)
@@ -118,7 +125,7 @@ def wrist_and_fingertip_motion(
     speed = _differences(points[:, :, 0, 1], whole, 1)
     jerk = np.linalg.norm(_differences(points, whole, 3), axis=-1)
     return {
-        "wrist_speed_p99": _of(lambda values: np.percentile(np.abs(values), _UPPER), speed),
+        "wrist_speed_p99": _of(_upper, np.abs(speed)),
         "wrist_jerk": _of(np.median, jerk[:, :, 0]),
         "fingertip_jerk": _of(np.median, jerk[:, :, 1:]),
     }
@@ -144,34 +151,42 @@ def _of_controls(ctrl: NDArray[np.float64]) -> dict[str, float | None]:
     """Of the controls (T, S, 46); those beyond an end are sent as that end."""
     low, high = world_model().actuator_ctrlrange.T
     slack = _END * (high - low)
-    at_end = (ctrl <= low + slack) | (ctrl >= high - slack)
+    at_end = ((ctrl <= low + slack) | (ctrl >= high - slack)).astype(np.float64)
     return _mean_and_worst("controls_at_end", at_end, ctrl)
 
 
-def _of_motion(moved: Motion, whole: NDArray[np.bool_]) -> dict[str, float | None]:
-    """Of all instants in frames that are whole."""
+def _of_motion(performance: Performance, whole: NDArray[np.bool_]) -> dict[str, float | None]:
+    """Of all instants in frames that are whole; NaN if it is another motion than was kept."""
+    another: dict[str, float | None] = dict.fromkeys(_OF_MOTION, np.nan)
+    if not np.isfinite(performance.ctrl).all():
+        return another
     model = world_model()
     hinges, rails, pushing = _joints_and_rails()
     limited = np.flatnonzero(model.actuator_forcelimited)
-    kept = whole[moved.frame]
-    # A motion that is not the performance's says nothing about it.
-    velocity = np.where(moved.same, moved.velocity, np.nan)
-    force = np.where(moved.same, moved.force, np.nan)
-    turning = np.abs(velocity[kept][:, hinges])
-    change = np.diff(velocity[:, rails], axis=0) / PHYSICS_DT
-    # The first step after a broken frame begins in the pose in which it was put back.
-    change = change[kept[1:] & kept[:-1]]
-    pushed = np.abs(force[kept])
-    greatest = np.abs(model.actuator_forcerange[limited]).max(axis=1)
-    at_limit = pushed[:, limited] >= greatest * (1 - _END)
+    limits = np.abs(model.actuator_forcerange[limited]).max(axis=1) * (1 - _END)
+    # Only the greatest of each instant are kept: a performance may last for hours.
+    instants: list[NDArray[np.float64]] = []
+    at_limit: list[NDArray[np.float64]] = []
+    for frame, moved in enumerate(motion(performance)):
+        if not moved.same:
+            return another
+        if not whole[frame]:
+            continue
+        speed, pushed = np.abs(moved.velocity[1:]), np.abs(moved.force)
+        change = np.abs(np.diff(moved.velocity[:, rails], axis=0)) / PHYSICS_DT
+        parts = (speed[:, hinges], speed[:, rails], change, pushed[:, pushing])
+        instants.append(np.stack([part.max(axis=1) for part in parts], axis=1))
+        at_limit.append((pushed[:, limited] >= limits).mean(axis=0))
+    joint, rail, changed, force = np.reshape(instants, (-1, 4)).T
+    shares = np.reshape(at_limit, (-1, len(limited)))
     return {
-        "joint_speed_p99": _of(lambda values: np.percentile(values, _UPPER), turning),
-        "joint_speed_max": _of(np.max, turning),
-        "joints_fast": _share(np.any(turning > FAST_JOINT, axis=1), turning),
-        "rail_speed_max": _of(np.max, np.abs(velocity[kept][:, rails])),
-        "rail_acceleration_max": _of(np.max, np.abs(change)),
-        "rail_force_max": _of(np.max, pushed[:, pushing]),
-        **_mean_and_worst("forces_at_limit", at_limit, pushed[:, limited]),
+        "joint_speed_p99": _of(_upper, joint),
+        "joint_speed_max": _of(np.max, joint),
+        "joints_fast": _share(joint > FAST_JOINT, joint),
+        "rail_speed_max": _of(np.max, rail),
+        "rail_acceleration_max": _of(np.max, changed),
+        "rail_force_max": _of(np.max, force),
+        **_mean_and_worst("forces_at_limit", shares, force),
     }
 
 
@@ -206,30 +221,33 @@ def _differences(
     return scaled
 
 
-def _of(
-    what: Callable[[NDArray[np.float64]], np.floating], values: NDArray[np.float64]
-) -> float | None:
-    """A statistic; None of nothing, NaN of what is not finite."""
-    if not values.size:
-        return None
-    return float(what(values)) if np.isfinite(values).all() else np.nan
+def _upper(values: NDArray[np.float64]) -> np.floating:
+    return np.percentile(values, _UPPER)
 
 
 def _share(holds: NDArray[np.bool_], made_of: NDArray[np.float64]) -> float | None:
-    """Share of the instants in which something holds; NaN if it is made of what is not finite."""
-    if not holds.size:
+    """Share of the instants in which something holds."""
+    return _of(np.mean, holds.astype(np.float64), made_of)
+
+
+def _of(
+    what: Callable[[NDArray[np.float64]], np.floating],
+    values: NDArray[np.float64],
+    made_of: NDArray[np.float64] | None = None,
+) -> float | None:
+    """A statistic of values; None of nothing, NaN if they are made of what is not finite."""
+    if not values.size:
         return None
-    return float(holds.mean()) if np.isfinite(made_of).all() else np.nan
+    finite = np.isfinite(values if made_of is None else made_of).all()
+    return float(what(values)) if finite else np.nan
 
 
 def _mean_and_worst(
-    name: str, holds: NDArray[np.bool_], made_of: NDArray[np.float64]
+    name: str, shares: NDArray[np.float64], made_of: NDArray[np.float64]
 ) -> dict[str, float | None]:
-    """The share over all actuators, which are last, and that of the one with the greatest."""
-    by_actuator = holds.reshape(-1, holds.shape[-1])
-    worst = by_actuator.mean(axis=0).max() if by_actuator.size else 0.0
-    share = _share(by_actuator, made_of)
+    """Shares of the actuators, which are last: the mean over all, and that of the greatest."""
+    by_actuator = shares.reshape(-1, shares.shape[-1]).mean(axis=0) if shares.size else shares
     return {
-        name: share,
-        f"{name}_worst": share if share is None or np.isnan(share) else float(worst),
+        name: _of(np.mean, by_actuator, made_of),
+        f"{name}_worst": _of(np.max, by_actuator, made_of),
     }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,49 +19,44 @@ _SAME = 1e-3
 they are the same bit for bit; another may round in another way."""
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """The hands after each of N physics steps, right 27 then left 27 joints.
+class FrameMotion(NamedTuple):
+    """The hands in one frame, right 27 joints then left 27.
 
     Attributes:
-        frame: (N,) frame of each step.
-        velocity: (N, 54) of the joints [rad/s, m/s].
-        force: (N, 46) of the actuators, right 23 then left 23 [N m, N].
-        same: whether it led through the positions that the performance has kept.
+        velocity: (11, 54) of the joints at the beginning, and after each physics step [rad/s, m/s].
+        force: (10, 46) of the actuators in each physics step, right 23 then left 23 [N m, N].
+        same: whether it led to the positions that the performance has kept.
     """
 
-    frame: NDArray[np.int64]
     velocity: NDArray[np.float64]
     force: NDArray[np.float64]
     same: bool
 
 
-def motion(performance: Performance) -> Motion:
+def motion(performance: Performance) -> Iterator[FrameMotion]:
     """Play the controls of a performance again, from the rest pose, and watch every physics step.
 
     Args:
         performance: with any number of controls a frame.
+
+    Yields:
+        The motion of one frame after the other.
+
+    Raises:
+        ValueError: a control is not finite.
     """
-    frames = len(performance)
-    velocity = np.empty((frames * SUBSTEPS, LAYOUT.hands_size))
-    force = np.empty((frames * SUBSTEPS, LAYOUT.ctrl_size))
-    apart = np.zeros(frames)
-    world = World(quiet=True)
-    rows = iter(range(len(velocity)))
+    velocity = np.empty((SUBSTEPS + 1, LAYOUT.hands_size))
+    force = np.empty((SUBSTEPS, LAYOUT.ctrl_size))
+    world, steps = World(quiet=True), 0
 
     def watch() -> None:
-        row = next(rows)
-        velocity[row] = world.data.qvel[KEYS:]
-        force[row] = world.data.actuator_force
+        nonlocal steps
+        step = steps % SUBSTEPS
+        velocity[step + 1], force[step] = world.data.qvel[KEYS:], world.data.actuator_force
+        steps += 1
 
-    for frame, ctrl in enumerate(performance.ctrl):
-        # MuJoCo would not take controls that are not finite; the motion ends before them.
-        if not np.isfinite(ctrl).all():
-            apart[frame:] = np.nan
-            velocity[frame * SUBSTEPS :] = force[frame * SUBSTEPS :] = np.nan
-            break
+    for ctrl, kept in zip(performance.ctrl, performance.qpos, strict=True):
+        velocity[0] = world.data.qvel[KEYS:]
         world.step(ctrl, watch=watch)
-        apart[frame] = np.abs(world.qpos_hands - performance.qpos[frame, KEYS:]).max()
-    # Not `apart > _SAME`: what is not finite is not the same.
-    same = bool((apart <= _SAME).all())
-    return Motion(np.repeat(np.arange(frames), SUBSTEPS), velocity, force, same)
+        apart = np.abs(world.qpos_hands - kept[KEYS:]).max()
+        yield FrameMotion(velocity.copy(), force.copy(), bool(apart <= _SAME))
