@@ -8,14 +8,16 @@ SECONDS = 2.0
 
 
 def main() -> None:
-    print(f"{'player':14} {'F1':>6} {'onset F1':>9} {'times real time':>16}")
+    print(f"{'player':14} {'note F1':>8} {'phantoms a minute':>18} {'frame F1':>9}")
     for player in PLAYERS:
         results = pianomime.evaluate(
             SONGS, player=player, effort=0, seconds=SECONDS, out=f"out/compare/{player}"
         )
         mean = results["mean"]
+        music = mean["music"]
         print(
-            f"{player:14} {mean['f1']:6.3f} {mean['onset_f1']:9.3f} {mean['realtime_factor']:16.1f}"
+            f"{player:14} {music['note_f1_50']:8.3f} {music['phantoms_per_minute']:18.1f} "
+            f"{mean['f1']:9.3f}"
         )
 
 

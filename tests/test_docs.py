@@ -190,7 +190,12 @@ def test_the_reference_names_everything_in_results() -> None:
     assert named(section("file-formats.md", "results.json")) == set(results)
     row = results["songs"][0]
     shown = section("file-formats.md", "report.json")
-    assert set(re.findall(r"`(\w+)`", shown)) == set(row) - {"causes"}
+    assert set(re.findall(r"`(\w+)`", shown)) == {*row, "pedal_f1"} - {"causes"}
+    for name in ("music", "body"):
+        shown = section("file-formats.md", f"The object {name}")
+        cells = "".join(line for line in shown.splitlines() if line.startswith("|"))
+        inner = {"share"} if name == "music" else set()
+        assert set(re.findall(r"`(\w+)`", cells)) == {*row[name], *inner}
 
 
 def argument_docs(owner: Any, name: str) -> str:

@@ -5,6 +5,7 @@ import json
 import os
 import tracemalloc
 from collections.abc import Iterable
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from matplotlib.image import imread
 import made_up
 from pianomime import Performance
 from pianomime.errors import InputError
+from pianomime.evaluation.measures import BODY, FRAMES, MORE_MUSIC, MUSIC
 from pianomime.evaluation.summary import summarize
 from pianomime.files import staged
 from pianomime.music import Score
@@ -25,14 +27,18 @@ from pianomime.report.mp3 import write_mp3
 from pianomime.world.render import RenderUnavailable
 
 PROTOCOL = (
-    "song", "player", "effort", "song_seconds", "frames", "precision", "recall", "f1", "onset_f1",
-    "pedal_f1", "plan_seconds", "simulate_seconds", "realtime_factor",
+    "song", "player", "effort", "song_seconds", "frames", "protocol", "touch", "music", "body",
+    "precision", "recall", "f1", "onset_f1", "plan_seconds", "simulate_seconds", "realtime_factor",
 )  # fmt: skip
 
 
 def test_numbers_hold_what_was_agreed() -> None:
     score = made_up.score()
-    row = summarize(made_up.performance(score))
+    performance = made_up.performance(score)
+    row = summarize(performance)
+    # It would be that of the score: nobody played it.
+    pedalled = summarize(replace(performance, works_pedal=True))
+    assert set(pedalled) == {*row, "pedal_f1"}
     assert set(row) == {*PROTOCOL, "notes", "dropped_notes", "blow_ups", "remarks"}
     assert row["frames"] == len(score.roll())
     assert row["dropped_notes"] == 1
@@ -73,6 +79,12 @@ def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) ->
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "&lt;b&gt;Bach &amp; Söhne" in html
     assert "effort 2" in html
+    assert row["protocol"] in html
+    # What an ear would judge leads.
+    ear = f"{row['music']['note_f1_50']:.3f}"
+    assert html.index(ear) < html.index("frame F1")
+    for measure in (*MUSIC, *MORE_MUSIC, *FRAMES, *BODY):
+        assert f"<tr><td>{measure.label}</td><td>{measure.show(row)}</td></tr>" in html
     sources = Page(html).sources
     assert len(sources) == 4
     assert all(source.startswith("data:") for source in sources)

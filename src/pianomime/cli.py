@@ -65,6 +65,9 @@ COMMANDS = {
     "evaluate": Command(
         "pianomime.commands.evaluate", "Evaluate", "play and score many songs", goes_on=True
     ),
+    "score": Command(
+        "pianomime.commands.score", "ScorePlaying", "score anybody's playing of a song"
+    ),
     "retarget": Command(
         "pianomime.commands.retarget", "Retarget", "make a demonstration of a video"
     ),

@@ -50,6 +50,7 @@ class Field:
         optional: whether it may be missing.
         may_be_nan: whether NaN may stand in an array for what is not known.
         may_be_infinite: whether numbers of JSON may be infinite; those of arrays never are.
+        may_be_null: whether null may stand in JSON for what could not be measured.
     """
 
     kind: Literal["bool", "int", "float", "number", "text", "object"]
@@ -60,6 +61,7 @@ class Field:
     optional: bool = False
     may_be_nan: bool = False
     may_be_infinite: bool = False
+    may_be_null: bool = False
 
     def check_layout(
         self, name: str, dtype: np.dtype[Any], shape: Sequence[int], sizes: dict[str, int]
@@ -119,11 +121,13 @@ class Field:
         Raises:
             InputError: it is of another kind or shape, out of range, or not among the choices.
         """
+        if value is None and self.may_be_null:
+            return
         if self.shape:
             size, *rest = self.shape
             if not isinstance(value, list) or (isinstance(size, int) and len(value) != size):
                 raise InputError(f"{name} must be a list of {size} ({self.kind})")
-            inner = replace(self, shape=tuple(rest))
+            inner = replace(self, shape=tuple(rest), may_be_null=False)
             for each in value:
                 inner.check_json(name, each)
             return

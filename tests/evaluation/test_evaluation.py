@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ import pytest
 
 from pianomime import evaluate, songs
 from pianomime.errors import InputError
-from pianomime.evaluation.evaluation import markdown
 from pianomime.evaluation.song_worker import SONG_WORKER, song_request
+from pianomime.evaluation.table import markdown
+from pianomime.music import protocol_digest
+from pianomime.music.protocol import CONSTANTS
 from pianomime.policies.methods import WEIGHTS
 from pianomime.songs.find import find_songs
 from pianomime.workers import Worker
@@ -41,7 +44,7 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
     asked = {"player", "effort", "seed", "settings", "seconds"}
-    assert set(results) == asked | {"songs", "mean", "causes"}
+    assert set(results) == asked | {"songs", "mean", "measured", "causes"}
     assert results["seconds"] == 1.0
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())
@@ -52,6 +55,14 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     assert results["mean"]["f1"] == pytest.approx(mean, abs=1e-6)
     assert {row["effort"] for row in rows.values()} == {results["effort"]}
     assert "effort" not in results["mean"]
+    notes = [row["music"]["note_f1_50"] for row in rows.values()]
+    assert results["mean"]["music"]["note_f1_50"] == pytest.approx(sum(notes) / 5, abs=1e-6)
+    assert results["measured"]["f1"] == results["measured"]["music"]["note_f1_50"] == 5
+    for name in ("restruck", "chord_spread_p90_ms", "pedal_lifts_kept"):
+        known = [row["music"][name] for row in rows.values() if row["music"][name] is not None]
+        assert results["measured"]["music"][name] == len(known)
+    assert results["measured"]["body"]["hands_overlap"] == 5
+    assert {row["protocol"] for row in rows.values()} == {protocol_digest()}
     assert [step[:3] for step in told] == [("songs", n, 6) for n in range(7)]
     assert told[-1][3] == f"mean F1 {mean:.3f}"
 
@@ -62,11 +73,13 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     assert "causes" not in results["mean"]
 
     tables = (out / "results.md").read_text(encoding="utf-8").split("\n\n")
-    table, causes = (text.splitlines() for text in tables)
-    assert len(table) == 2 + 6 + 1
+    *tables, causes = (text.splitlines() for text in tables)
+    # By ear, with the one that failed; in frames; the hands.
+    assert [len(table) for table in tables] == [2 + 6 + 1, 2 + 5 + 1, 2 + 5 + 1]
     assert len(causes) == 2 + sum(len(shares) for shares in results["causes"].values())
     # Every line has as many cells as the first, the bar in the broken one's name escaped.
-    assert len({line.replace("\\|", "").count("|") for line in table}) == 1
+    for table in tables:
+        assert len({line.replace("\\|", "").count("|") for line in table}) == 1
 
 
 def test_weights_that_cannot_be_read_are_told_once(
@@ -187,6 +200,22 @@ def test_no_process_outlives_a_run_that_stops(
     assert all(process.poll() is not None for process in started)
 
 
+def test_results_of_another_protocol_are_not_reused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = songs.names()[0]
+
+    def finished() -> int:
+        return len(list(tmp_path.glob("songs/*.json")))
+
+    evaluate(name, "zero-shot-ik", seconds=0.5, jobs=1, out=tmp_path)
+    assert finished() == 1
+    changed = replace(CONSTANTS, match=0.2)
+    monkeypatch.setattr("pianomime.music.protocol.CONSTANTS", changed)
+    evaluate(name, "zero-shot-ik", seconds=0.5, jobs=1, out=tmp_path)
+    assert finished() == 2
+
+
 def test_a_worker_does_not_wait_for_what_only_reports_need() -> None:
     script = (
         "import sys, pianomime.evaluation.song_worker\n"
@@ -201,7 +230,7 @@ def test_a_worker_does_not_wait_for_what_only_reports_need() -> None:
 def test_when_all_fail_there_is_no_mean(tmp_path: Path) -> None:
     (tmp_path / "broken.mid").write_text("this is no music")
     results = evaluate(tmp_path, jobs=1)
-    assert results["mean"] == {}
+    assert results["mean"] == results["measured"] == {}
     assert results["causes"] == {"missed": {}, "wrong": {}}
     assert "failed" in markdown(results)
     assert list(tmp_path.iterdir()) == [tmp_path / "broken.mid"]

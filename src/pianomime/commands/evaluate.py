@@ -74,7 +74,8 @@ class Evaluate:
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.progress import bars
-        from pianomime.evaluation.evaluation import evaluate, markdown
+        from pianomime.evaluation.evaluation import evaluate
+        from pianomime.evaluation.table import markdown
         from pianomime.file_names import file_name
         from pianomime.shown import command_word, shown
 
@@ -97,6 +98,6 @@ class Evaluate:
         print(f"saved: {shown(out / 'results.json')}")
         kept = [row for row in results["songs"] if "performance" in row]
         if kept:
-            worst = min(kept, key=lambda row: float(row["f1"]))
+            worst = min(kept, key=lambda row: float(row["music"]["note_f1_50"]))
             path = command_word(out / worst["performance"])
-            print(f"see the lowest F1, {worst['song']}: pianomime report {path}")
+            print(f"hear the lowest note F1, {worst['song']}: pianomime report {path}")

@@ -95,12 +95,14 @@ def _table(row: Row) -> Table:
     from rich.table import Table
     from rich.text import Text
 
+    from pianomime.evaluation.measures import BODY, FRAMES, MUSIC
+
     # A Text, not a str, in which rich would look for markup.
     table = Table(title=Text(str(row["song"])), title_style="bold", show_header=False)
+    for measure in (*MUSIC, *FRAMES, *BODY):
+        # Units stand in brackets, which rich takes for markup.
+        table.add_row(Text(measure.label), measure.show(row))
     for label, text in (
-        ("F1", f"{row['f1']:.3f}"),
-        ("precision, recall", f"{row['precision']:.3f}, {row['recall']:.3f}"),
-        ("onset F1, pedal F1", f"{row['onset_f1']:.3f}, {row['pedal_f1']:.3f}"),
         ("notes (left out)", f"{row['notes']} ({row['dropped_notes']})"),
         ("physics broke", f"{row['blow_ups']} times"),
         (

@@ -17,18 +17,21 @@ from typing import Any
 import pianomime
 from pianomime.errors import InputError
 from pianomime.evaluation.diagnose import CAUSES_SCHEMA
+from pianomime.evaluation.mean import mean
 from pianomime.evaluation.song_worker import SONG_WORKER, play_song, song_request
 from pianomime.evaluation.summary import ROW_SCHEMA
+from pianomime.evaluation.table import markdown
 from pianomime.file_names import file_name
 from pianomime.files import atomic, files_digest
 from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.music import protocol_digest
 from pianomime.players.casting import Casting
 from pianomime.players.player import Player
 from pianomime.players.registry import EFFORT, is_registered, player_files
 from pianomime.players.settings import flat
 from pianomime.progress import Progress, no_progress
 from pianomime.sealed_json import read_json, sealed, unsealed
-from pianomime.shown import markdown_cell, shown, title_of
+from pianomime.shown import shown, title_of
 from pianomime.songs.find import find_songs
 from pianomime.staging import hold, sweep
 from pianomime.workers import answered, cores, work
@@ -38,6 +41,8 @@ Row = dict[str, Any]
 `pianomime.evaluation.diagnose.frames_by_cause`, if the player plans), or `song` and `error`. With a
 folder for the results, `performance` names the song's performance in it."""
 
+# The effort is the same for all songs.
+_MEASURES = {name: schema for name, schema in ROW_SCHEMA.items() if name != "effort"}
 # Those that decide how a song is played.
 _LIBRARIES = ("daqp", "mujoco", "numpy", "onnxruntime", "scipy")
 
@@ -80,8 +85,9 @@ def evaluate(
     Returns:
         What `results.json` holds: `player`, `effort`, `seed`, `settings` and `seconds` as asked for
         (None: whole songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was
-        measured, over the songs that did not fail; empty if all did) and `causes` (`missed` and
-        `wrong`: the share of the key-frames wanted in all songs that each cause cost, the
+        measured, over the songs that did not fail and in which there was something to measure;
+        empty if all failed), `measured` (of how many songs each mean is) and `causes` (`missed`
+        and `wrong`: the share of the key-frames wanted in all songs that each cause cost, the
         costliest first).
 
     Raises:
@@ -112,7 +118,7 @@ def evaluate(
     made_by = ""
     if not only_here:
         files = files_digest(player_files(str(player)))
-        key = [str(player), effort, seed, chosen, f"{seconds:g}", files]
+        key = [str(player), effort, seed, chosen, f"{seconds:g}", files, protocol_digest()]
         made_by = f"{json.dumps(key, sort_keys=True)} {_program_hash()}"
     store = None if out is None else _Store(Path(out), made_by)
     with nullcontext() if store is None else store.held():
@@ -156,6 +162,8 @@ def evaluate(
                 rows[song] = row
                 report()
 
+        good = [row for row in rows.values() if "error" not in row]
+        means = mean(good, _MEASURES)
         results = {
             "player": shown(player.name if isinstance(player, Player) else player),
             "effort": player.effort if isinstance(player, Player) else effort,
@@ -163,7 +171,8 @@ def evaluate(
             "settings": chosen,
             "seconds": seconds if math.isfinite(seconds) else None,
             "songs": [rows[song] for song in songs],
-            "mean": _mean(list(rows.values())),
+            "mean": means.value,
+            "measured": means.songs,
             "causes": _causes(list(rows.values())),
         }
         if store is not None:
@@ -214,62 +223,6 @@ def read_row(path: Path) -> Row:
         return unsealed(content, schema, path.name)
     except InputError as error:
         raise InputError(f"{path}: damaged, or not the result of a song ({error})") from error
-
-
-def markdown(results: dict[str, Any]) -> str:
-    """The results as Markdown: a table of songs and their means, and one of causes.
-
-    Args:
-        results: what `evaluate` returns.
-    """
-    columns = ("f1", "precision", "recall", "onset_f1", "pedal_f1", "realtime_factor")
-    lines = [
-        "| song | F1 | precision | recall | onset F1 | pedal F1 | real time | left out | broke |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
-    ]
-
-    def cells(row: Row) -> list[str]:
-        return [f"{row[name]:.3f}" for name in columns[:-1]] + [f"{row[columns[-1]]:.1f}x"]
-
-    for row in results["songs"]:
-        song = markdown_cell(row["song"])
-        if "error" in row:
-            lines.append(f"| {song} | failed: {markdown_cell(row['error'])} | | | | | | | |")
-        else:
-            whole = f"{row['dropped_notes']}/{row['notes']} | {row['blow_ups']}"
-            lines.append(f"| {song} | {' | '.join(cells(row))} | {whole} |")
-    mean = results["mean"]
-    if mean:
-        whole = f"{mean['dropped_notes']:.1f}/{mean['notes']:.1f} | {mean['blow_ups']:.1f}"
-        lines.append(f"| **mean** | {' | '.join(cells(mean))} | {whole} |")
-    mended = [row for row in results["songs"] if row.get("remarks")]
-    if mended:
-        lines += ["", "| song | mended or left out when it was read |", "| --- | --- |"]
-        lines += [
-            f"| {markdown_cell(row['song'])} | {markdown_cell('; '.join(row['remarks']))} |"
-            for row in mended
-        ]
-    causes = [
-        (share, kind, cause)
-        for kind, shares in results["causes"].items()
-        for cause, share in shares.items()
-    ]
-    if causes:
-        lines += ["", "| cause | | of the key-frames wanted |", "| --- | --- | ---: |"]
-        lines += [
-            f"| {cause} | {kind} | {share:.2%} |" for share, kind, cause in sorted(causes)[::-1]
-        ]
-    return "\n".join(lines) + "\n"
-
-
-def _mean(rows: list[Row]) -> dict[str, float]:
-    """Mean of every number over the rows without an error."""
-    good = [row for row in rows if "error" not in row]
-    if not good:
-        return {}
-    names = [name for name, value in good[0].items() if isinstance(value, int | float)]
-    names.remove("effort")
-    return {name: round(sum(row[name] for row in good) / len(good), 6) for name in names}
 
 
 def _causes(rows: list[Row]) -> dict[str, dict[str, float]]:

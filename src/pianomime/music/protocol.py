@@ -166,6 +166,19 @@ class MusicMetrics:
     inner: Voice
 
 
+def match_notes(score: Score, played: Score) -> Candidates:
+    """Match strikes with the wanted notes that they stand for, as `MusicMetrics` has it.
+
+    Args:
+        score: what was to be played.
+        played: what was played, in the same time.
+
+    Returns:
+        The matched pairs; strikes in none of them are phantoms.
+    """
+    return Candidates.of(score, played, CONSTANTS.match).nearest()
+
+
 def music_metrics(score: Score, played: Score) -> MusicMetrics:
     """Measure a playing against a score by the `music` protocol.
 
@@ -178,7 +191,7 @@ def music_metrics(score: Score, played: Score) -> MusicMetrics:
     """
     wanted, heard = strikes(score), strikes(played)
     near = Candidates.of(wanted, heard, CONSTANTS.match)
-    matched = near.nearest()
+    matched = match_notes(wanted, heard)
     struck = np.zeros(len(wanted), bool)
     struck[matched.wanted] = True
     phantoms = len(heard) - len(matched.late)

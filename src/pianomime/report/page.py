@@ -10,6 +10,7 @@ from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
+from pianomime.evaluation.measures import BODY, FRAMES, MORE_MUSIC, MUSIC, Measure
 from pianomime.evaluation.summary import Row
 from pianomime.web_page import data_url, web_page
 
@@ -47,35 +48,32 @@ $film<section>
 <h2>Piano roll</h2>
 <picture>
 <source media="(prefers-color-scheme: dark)" srcset="$dark_picture">
-<img alt="Piano roll: notes wanted, played, missed and wrong, coloured by hand" src="$picture">
+<img alt="Piano roll: notes played and missed, coloured by hand, and phantom notes" src="$picture">
 </picture>
 </section>
-<section>
-<h2>Summary</h2>
-<table>
-$rows</table>
-</section>
-<footer>Made by PianoMime $version. F1 compares the keys that are down in every twentieth of a
-second; onset F1 compares the beginnings of notes, within 50 ms.</footer>
+$tables<footer>Made by PianoMime $version. Note F1 compares when each key was struck with when the
+score asks for it, and velocity F1 also how hard; a phantom note is a strike that nobody asked for.
+No lag is taken off. Protocol <code>$protocol</code>, touch <code>$touch</code>.</footer>
 """)
 
-_TILES = {
-    "f1": "F1",
-    "precision": "Precision",
-    "recall": "Recall",
-    "onset_f1": "Onset F1",
-    "pedal_f1": "Pedal F1",
+_TILES = MUSIC[:-1]
+"""Those whose value is one number."""
+_TABLES = {
+    "What an ear would judge": (*MUSIC, *MORE_MUSIC),
+    "Keys in frames, as in the paper": FRAMES,
+    "Hands": BODY,
+    "Summary": (
+        Measure("Length of the song", "song_seconds", "{:.1f} s"),
+        Measure("Frames of 0.05 s", "frames", "{}"),
+        Measure("Notes in the score", "notes", "{}"),
+        Measure("Notes not planned: out of reach of ten fingers", "dropped_notes", "{}"),
+        Measure("Frames in which the physics became unstable", "blow_ups", "{}"),
+        Measure("Time to plan", "plan_seconds", "{:.2f} s"),
+        Measure("Time to simulate", "simulate_seconds", "{:.2f} s"),
+        Measure("Seconds of music per second of computing", "realtime_factor", "{:.1f}"),
+    ),
 }
-_ROWS = {
-    "song_seconds": ("Length of the song", "{:.1f} s"),
-    "frames": ("Frames of 0.05 s", "{}"),
-    "notes": ("Notes in the score", "{}"),
-    "dropped_notes": ("Notes not planned: out of reach of ten fingers", "{}"),
-    "blow_ups": ("Frames in which the physics became unstable", "{}"),
-    "plan_seconds": ("Time to plan", "{:.2f} s"),
-    "simulate_seconds": ("Time to simulate", "{:.2f} s"),
-    "realtime_factor": ("Seconds of music per second of computing", "{:.1f}"),
-}
+"""Tables by their headings."""
 
 MOST_EMBEDDED = 16 * 1024**2
 """[bytes] Larger files stand beside the page: sound of more than 17 minutes, and long films."""
@@ -101,14 +99,7 @@ def page(
         dark_picture: of one for dark pages.
         film: of the film of the performance, or None.
     """
-    tiles = (
-        f"<div><dt>{label}</dt><dd>{summary[name]:.3f}</dd></div>\n"
-        for name, label in _TILES.items()
-    )
-    rows = (
-        f"<tr><td>{label}</td><td>{form.format(summary[name])}</td></tr>\n"
-        for name, (label, form) in _ROWS.items()
-    )
+    tiles = (f"<div><dt>{tile.label}</dt><dd>{tile.show(summary)}</dd></div>\n" for tile in _TILES)
     film_section = warning = ""
     if film is not None:
         film_section = (
@@ -132,7 +123,9 @@ def page(
         effort=summary["effort"],
         version=escape(version),
         tiles="".join(tiles),
-        rows="".join(rows),
+        tables="".join(_table(heading, rows, summary) for heading, rows in _TABLES.items()),
+        protocol=escape(str(summary["protocol"])),
+        touch=escape(str(summary["touch"])),
         film=film_section,
         warning=warning,
         played=played,
@@ -141,6 +134,11 @@ def page(
         dark_picture=dark_picture,
     )
     return web_page(f"{summary['song']} - PianoMime", body, _STYLE)
+
+
+def _table(heading: str, rows: tuple[Measure, ...], summary: Row) -> str:
+    cells = (f"<tr><td>{row.label}</td><td>{row.show(summary)}</td></tr>\n" for row in rows)
+    return f"<section>\n<h2>{heading}</h2>\n<table>\n{''.join(cells)}</table>\n</section>\n"
 
 
 def source(kind: str, file: Path) -> str:

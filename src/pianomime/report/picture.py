@@ -1,8 +1,9 @@
-"""Picture of the piano roll: notes played, missed and wrong, coloured by hand."""
+"""Picture of the piano roll: notes played and missed, coloured by hand, and phantom notes."""
 
 from __future__ import annotations
 
 import os
+from dataclasses import asdict
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -10,18 +11,26 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from pianomime.evaluation.measures import MUSIC
+from pianomime.music import Score, match_notes, music_metrics
+from pianomime.music.key_time import strikes
 from pianomime.palette import LIGHT, Theme
 from pianomime.plan import LEFT, RIGHT
 from pianomime.players.performance import Performance
-from pianomime.report.roll import Layer, Lines, corners, legend, runs, save, sheet
+from pianomime.report.roll import Layer, Lines, boxes, legend, save, sheet
 
 _NOBODY = 2
 """Index, after LEFT and RIGHT, of the colour of notes that were assigned to no hand."""
 _HEAD = 1.05  # [inches]
+_REMARK = [
+    measure
+    for measure in MUSIC
+    if measure.name in ("music.note_f1_50", "music.velocity_f1", "music.phantoms_per_minute")
+]
 
 
 def draw(performance: Performance, path: str | os.PathLike[str], theme: Theme = LIGHT) -> None:
-    """Draw the piano roll of a performance into a PNG file.
+    """Draw the piano roll of a performance, in its true times, into a PNG file.
 
     Args:
         performance: the performance to draw.
@@ -29,48 +38,48 @@ def draw(performance: Performance, path: str | os.PathLike[str], theme: Theme = 
         theme: the colours.
     """
     lines = Lines.of(performance)
-    metrics = performance.metrics()
-    figure = sheet(
-        _HEAD + lines.height,
-        performance.score.title,
-        f"F1 {metrics['f1']:.3f}    precision {metrics['precision']:.3f}    "
-        f"recall {metrics['recall']:.3f}    onset F1 {metrics['onset_f1']:.3f}",
-        theme,
-    )
+    row = {"music": asdict(music_metrics(performance.score, performance.played()))}
+    remark = "    ".join(f"{measure.label}: {measure.show(row)}" for measure in _REMARK)
+    figure = sheet(_HEAD + lines.height, performance.score.title, remark, theme)
     legend(figure, _entries(performance, theme), theme)
     layers = _layers(performance, theme)
-    pedal = corners(runs(performance.pedal[:, None]))
-    pedal[..., 1] += lines.low - 3.1  # a strip below the keys
-    layers.append(Layer(pedal, theme.hands[_NOBODY], theme.hands[_NOBODY]))
+    # A strip below the keys.
+    pedal = performance.pedal_times
+    strip = boxes(np.full(len(pedal), lines.low - 3.1), pedal[:, 0], pedal[:, 1])
+    layers.append(Layer(strip, theme.hands[_NOBODY], theme.hands[_NOBODY]))
     lines.draw(figure, layers, theme)
     save(figure, path, theme)
 
 
 def _layers(performance: Performance, theme: Theme) -> list[Layer]:
-    wanted = performance.score.roll()
-    hand = _hand_of_cell(performance)
-    layers = []
+    """Wanted notes below what was played of them; over it notes without a strike, and phantoms."""
+    wanted, played = strikes(performance.score), strikes(performance.played())
+    matched = match_notes(wanted, played)
+    hand = _hand_of_note(performance)
+    struck = np.zeros(len(wanted), bool)
+    struck[matched.wanted] = True
+    phantom = np.ones(len(played), bool)
+    phantom[matched.played] = False
+
+    def layer(score: Score, notes: NDArray[np.int64], face: str, edge: str) -> Layer:
+        return Layer(boxes(score.key[notes], score.onset[notes], score.offset[notes]), face, edge)
+
+    below, heard, over = [], [], []
     for whose in (LEFT, RIGHT, _NOBODY):
+        light, dark = theme.wanted[whose], theme.hands[whose]
         mine = hand == whose
-        missed, played = runs(wanted & mine), runs(wanted & performance.pressed & mine)
-        layers.append(Layer(corners(missed), theme.wanted[whose], theme.hands[whose]))
-        layers.append(Layer(corners(played), theme.hands[whose], theme.hands[whose]))
-    wrong = runs(performance.pressed & ~wanted)
-    layers.append(Layer(corners(wrong), theme.wrong, theme.wrong))
-    return layers
+        below.append(layer(wanted, np.flatnonzero(mine & struck), light, dark))
+        heard.append(layer(played, matched.played[mine[matched.wanted]], dark, dark))
+        over.append(layer(wanted, np.flatnonzero(mine & ~struck), light, dark))
+    return [*below, *heard, *over, layer(played, np.flatnonzero(phantom), theme.wrong, theme.wrong)]
 
 
-def _hand_of_cell(performance: Performance) -> NDArray[np.int8]:
-    """(T, 88) Hand that each note was assigned to, `_NOBODY` where there is none."""
-    hand = np.full(performance.pressed.shape, _NOBODY, np.int8)
-    if performance.plan is not None:
-        score = performance.score
-        for (first, stop), key, whose in zip(
-            score.note_frames(), score.key, performance.plan.note_hand, strict=True
-        ):
-            if whose in (LEFT, RIGHT):
-                hand[first:stop, key] = whose
-    return hand
+def _hand_of_note(performance: Performance) -> NDArray[np.int64]:
+    """(N,) Hand that each note was assigned to, `_NOBODY` where there is none."""
+    if performance.plan is None:
+        return np.full(len(performance.score), _NOBODY)
+    hand = performance.plan.note_hand
+    return np.where(np.isin(hand, (LEFT, RIGHT)), hand, _NOBODY)
 
 
 def _entries(performance: Performance, theme: Theme) -> list[Artist]:
@@ -84,11 +93,11 @@ def _entries(performance: Performance, theme: Theme) -> list[Artist]:
         box(theme.hands[RIGHT], theme.hands[RIGHT], "right hand"),
         box(theme.wanted[LEFT], theme.hands[LEFT], "missed, left"),
         box(theme.wanted[RIGHT], theme.hands[RIGHT], "missed, right"),
-        box(theme.wrong, theme.wrong, "wrong"),
+        box(theme.wrong, theme.wrong, "phantom"),
     ]
     if performance.plan is None or performance.dropped_notes:
         entries.append(box(theme.wanted[_NOBODY], theme.hands[_NOBODY], "assigned to no hand"))
-    if performance.pedal.any():
+    if len(performance.pedal_times):
         entries.append(Line2D([], [], color=theme.hands[_NOBODY], linewidth=4, label="pedal"))
     if len(performance.blow_ups):
         entries.append(

@@ -47,7 +47,7 @@ class Layer(NamedTuple):
     """Boxes of one colour on a roll.
 
     Attributes:
-        corners: (M, 4, 2) corners of M boxes [s, keys], as `corners` returns them.
+        corners: (M, 4, 2) corners of M boxes [s, keys], as `boxes` and `corners` return them.
         face: colour of their faces.
         edge: colour of their edges.
     """
@@ -130,15 +130,27 @@ class Lines:
         figure.axes[-1].set_xlabel("seconds", color=theme.faint_text, fontsize=9)
 
 
+def boxes(
+    key: NDArray[np.number], start: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(M, 4, 2) Corners of boxes [s, keys].
+
+    Args:
+        key: (M,) the height of each box.
+        start: (M,) when it begins [s].
+        end: (M,) when it ends [s].
+    """
+    low, high = key + 0.08, key + 0.92
+    return np.stack([start, low, start, high, end, high, end, low], axis=1).reshape(-1, 4, 2)
+
+
 def corners(runs: NDArray[np.int64]) -> NDArray[np.float64]:
     """(M, 4, 2) Corners of boxes [s, keys].
 
     Args:
         runs: (M, 3) first frame, frame after the last one, and key of each box.
     """
-    start, end = runs[:, 0] / FRAME_RATE, runs[:, 1] / FRAME_RATE
-    low, high = runs[:, 2] + 0.08, runs[:, 2] + 0.92
-    return np.stack([start, low, start, high, end, high, end, low], axis=1).reshape(-1, 4, 2)
+    return boxes(runs[:, 2], runs[:, 0] / FRAME_RATE, runs[:, 1] / FRAME_RATE)
 
 
 def runs(cells: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -221,8 +233,9 @@ def legend(figure: Figure, entries: Sequence[Artist], theme: Theme) -> None:
 
 def _key_range(performance: Performance) -> tuple[int, int]:
     """Lowest key to show, and the key after the highest one."""
-    used = np.flatnonzero(performance.pressed.any(axis=0) | performance.score.roll().any(axis=0))
-    low, high = (int(used[0]), int(used[-1]) + 1) if len(used) else (40, 40)
+    down = np.flatnonzero(performance.pressed.any(axis=0))
+    used = np.concatenate([down, performance.event_key, performance.score.key])
+    low, high = (int(used.min()), int(used.max()) + 1) if len(used) else (40, 40)
     middle = (low + high) / 2
     low = max(0, min(low - 2, int(middle - _FEWEST_KEYS / 2)))
     high = min(KEYS, max(high + 2, low + _FEWEST_KEYS))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from pianomime import __version__
 from pianomime.evaluation.summary import Row, summarize
-from pianomime.music import Score
+from pianomime.keyboard import FRAME_RATE
+from pianomime.music import Score, match_notes
 from pianomime.music.sound import BLOCK_SECONDS, Sound
 from pianomime.music.wav import WavFile, write_wav_blocks
 from pianomime.palette import DARK, LIGHT
@@ -124,15 +125,22 @@ def _write_sounds(played: Score, wanted: Score, folder: Path) -> None:
 
 
 def _write_film(performance: Performance, folder: Path, progress: Progress) -> None:
-    """Write `performance.mp4`.
+    """Write `performance.mp4`: keys are lit while they sound, phantoms in a colour of their own.
 
     Raises:
         RenderUnavailable: there is no working OpenGL.
     """
-    wrong = performance.pressed & ~performance.score.roll()
+    played = performance.played()
+    phantom = np.ones(len(played), bool)
+    phantom[match_notes(performance.score, played).played] = False
+    sounding, wrong = np.zeros((2, *performance.pressed.shape), bool)
+    spans = np.stack([np.floor(played.onset * FRAME_RATE), np.ceil(played.offset * FRAME_RATE)])
+    for note, (first, stop) in enumerate(spans.T.astype(int).tolist()):
+        sounding[first:stop, played.key[note]] = True
+        wrong[first:stop, played.key[note]] |= phantom[note]
 
     def colours(frame: int) -> NDArray[np.float32]:
-        shown = key_colours(performance.pressed[frame])
+        shown = key_colours(sounding[frame])
         shown[wrong[frame]] = to_rgb(LIGHT.wrong)
         return shown
 
@@ -140,7 +148,7 @@ def _write_film(performance: Performance, folder: Path, progress: Progress) -> N
         write_video(
             folder / "performance.mp4",
             performance.qpos,
-            performance.pressed,
+            sounding,
             audio,
             audio.sample_rate,
             colours=colours,

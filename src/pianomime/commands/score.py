@@ -1,0 +1,102 @@
+"""`pianomime score`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from pianomime.keyboard import EXCERPT_SECONDS
+
+if TYPE_CHECKING:
+    from pianomime.music import Score
+
+
+@dataclass(frozen=True)
+class ScorePlaying:
+    """Score a playing by the music protocol: notes, touch, chords, repeated notes and pedal.
+
+    The playing may be anybody's: a performance of ours, or a MIDI file that another program, robot
+    or person has made. It is compared in true time, and no lag is taken off.
+
+    Examples:
+      pianomime score out/fur-elise/performance.npz
+      pianomime score PLAYED.mid --against SONG.mid
+      pianomime score PLAYED.mid --against SONG.mid --no-trim --seconds inf --json
+    """
+
+    played: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PLAYED")]
+    """What was played: a performance (.npz) or a MIDI file."""
+    against: Annotated[str | None, tyro.conf.arg(metavar="SONG", help_behavior_hint="")] = None
+    """What was to be played: a MIDI file, or the name of a bundled song. A performance has its
+    own."""
+    start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
+    """Where in SONG the playing begins [s]."""
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
+    """How much of SONG to score at most [s]; inf for all of it."""
+    trim: bool = True
+    """Whether PLAYED begins with the first sound of SONG at or after START, as what `pianomime
+    play` writes does. Otherwise time runs alike in both files, from their beginnings."""
+    json: bool = False
+    """Print JSON: `song`, `protocol` and the object `music`."""
+
+    def run(self) -> None:
+        """Score and print.
+
+        Raises:
+            InputError: a file is of another kind or damaged, or it is not known what was to be
+                played.
+            OSError: a file cannot be read.
+        """
+        import json
+        from dataclasses import asdict
+
+        from rich.console import Console
+        from rich.table import Table
+        from rich.text import Text
+
+        from pianomime.evaluation.measures import MORE_MUSIC, MUSIC
+        from pianomime.evaluation.summary import json_of
+        from pianomime.music import music_metrics, protocol_digest
+
+        score, played = self._load()
+        row = {
+            "song": score.title,
+            "protocol": protocol_digest(),
+            "music": json_of(asdict(music_metrics(score, played))),
+        }
+        if self.json:
+            print(json.dumps(row, indent=2, ensure_ascii=False, allow_nan=False))
+            return
+        # Texts, not strs, in which rich would look for markup.
+        table = Table(title=Text(score.title), title_style="bold", show_header=False)
+        for measure in (*MUSIC, *MORE_MUSIC):
+            table.add_row(Text(measure.label), measure.show(row))
+        Console().print(table)
+
+    def _load(self) -> tuple[Score, Score]:
+        """What was to be played, and what was, in one time."""
+        from pianomime.errors import InputError
+        from pianomime.music import Score, excerpt
+        from pianomime.players.performance import Performance
+        from pianomime.songs.find import find_song
+
+        performance = Performance.load(self.played) if self.played.suffix == ".npz" else None
+        if self.against is None:
+            for name in ("start", "seconds", "trim"):
+                if getattr(self, name) != getattr(ScorePlaying, name):
+                    raise InputError(f"--{name} is a part of a song: name that with --against")
+            if performance is None:
+                raise InputError(
+                    f"{self.played}: say what was to be played with --against SONG.mid"
+                )
+            return performance.score, performance.played()
+        song = Score.from_midi(find_song(self.against))
+        played = Score.from_midi(self.played) if performance is None else performance.played()
+        if self.trim:
+            score, begins = excerpt(song, self.start, self.seconds), 0.0
+        else:
+            score, begins = song.clip(self.start, self.start + self.seconds), self.start
+        return score, played.clip(begins, begins + self.seconds)
