@@ -89,7 +89,7 @@ class Player(ABC):
             frame = step.frame
             ctrl.append(np.atleast_2d(step.ctrl))
             pedal[frame] = step.pedal
-            notes.add(world.key_events, frame * FRAME_SECONDS)
+            notes.add(step.key_events, frame * FRAME_SECONDS)
             qpos[frame], key_state[frame] = world.qpos, world.key_state
             pressed[frame] = world.pressed
             blow_ups[frame] = world.blow_ups

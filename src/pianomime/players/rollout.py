@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import FRAME_SECONDS
 from pianomime.track import Controller, PedalController
 from pianomime.world import World
+from pianomime.world.key_sensor import NOTHING, KeyEvents
 
 
 class Step(NamedTuple):
@@ -20,11 +22,13 @@ class Step(NamedTuple):
         ctrl: (46,) the control that was held in it, or (S, 46) those that followed one another,
             right then left [rad, m].
         pedal: whether the sustain pedal was down.
+        key_events: what keys did, timed from the beginning of the frame.
     """
 
     frame: int
     ctrl: NDArray[np.float64]
     pedal: bool
+    key_events: KeyEvents
 
 
 def rollout(controller: Controller, world: World, pedal: NDArray[np.bool_]) -> Iterator[Step]:
@@ -36,8 +40,13 @@ def rollout(controller: Controller, world: World, pedal: NDArray[np.bool_]) -> I
         pedal: (T,) bool, the pedal of the score in every frame.
     """
     pedalling = controller if isinstance(controller, PedalController) else None
+    parts = getattr(controller, "controls_per_frame", 1)
     for frame in range(len(pedal)):
-        ctrl = controller.control(frame, world)
-        down = bool(pedal[frame]) if pedalling is None else pedalling.pedal(frame)
-        world.step(ctrl, down)
-        yield Step(frame, ctrl, down)
+        sent, events = [], NOTHING
+        for part in range(parts):
+            sent.append(controller.control(frame * parts + part, world))
+            down = bool(pedal[frame]) if pedalling is None else pedalling.pedal(frame)
+            world.step(sent[-1], down, parts=parts)
+            events = events.followed_by(world.key_events.later(part * FRAME_SECONDS / parts))
+        ctrl = sent[0] if parts == 1 else np.array(sent)
+        yield Step(frame, ctrl, down, events)

@@ -9,11 +9,11 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.keyboard import KEYS
 from pianomime.world.key_sensor import NOTHING, sense, silenced
 from pianomime.world.layout import LAYOUT
 from pianomime.world.model import world_model
-from pianomime.world.parameters import SUBSTEPS
+from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS
 from pianomime.world.state import (
     BLOW_UP,
     RESETS,
@@ -98,33 +98,35 @@ class WorldBatch(WorldState):
         Raises:
             ValueError: `ctrl` has another shape or is not finite.
         """
-        targets = controls_of_frame(ctrl, len(self), self.model.nu)
-        before = self.qpos
+        targets = controls_of_frame(ctrl, 1, len(self), self.model.nu)
         self.pedal[:] = pedal
         self._keep_pressed_keys_awake()
-        moved = np.empty((2, SUBSTEPS + 1, len(self), KEYS))
+        self.key_events, hold = NOTHING, SUBSTEPS // len(targets)
+        for number, target in enumerate(targets):
+            self._hold(target, hold, number * hold)
+
+    def _hold(self, target: NDArray[np.float64], substeps: int, done: int) -> None:
+        """Hold controls for some physics steps, after others in the same step."""
+        before = self.qpos
+        moved = np.empty((2, substeps + 1, len(self), KEYS))
         moved[:, 0] = before[:, :KEYS], self._velocities()[:, :KEYS]
-        recorded = self._batch.rollout(
-            SUBSTEPS,
-            np.repeat(targets, SUBSTEPS // targets.shape[1], axis=1),
-            int(mujoco.mjtState.mjSTATE_CTRL),
-            _RECORDED,
-        )
+        self._batch.bind("ctrl")[:] = target
+        recorded = self._batch.rollout(substeps, record=_RECORDED)
         for quantity, name in enumerate(_RECORDED):
             moved[quantity, 1:] = recorded[name][..., :KEYS].swapaxes(0, 1)
         broken = self._broken()
-        lost = np.zeros((len(self), KEYS), bool)
-        lost[broken] = self.sounding[broken]
-        self.sounding[broken] = False
+        lost = np.zeros_like(self.sounding)
+        lost[broken], self.sounding[broken] = self.sounding[broken], False
         moved[:, 1:, broken] = moved[:, :1, broken]
-        self.key_events = sense(moved[0], moved[1], self.sounding)
+        events = sense(moved[0], moved[1], self.sounding)
         if len(broken):
-            self.key_events = self.key_events.followed_by(silenced(lost, FRAME_SECONDS))
             self.blow_ups[broken] += 1
             if not self.quiet:
                 which = ", ".join(map(str, broken))
-                warnings.warn(f"{BLOW_UP} (worlds {which})", PhysicsWarning, stacklevel=2)
+                warnings.warn(f"{BLOW_UP} (worlds {which})", PhysicsWarning, stacklevel=3)
             self._put(reset_pose_after_instability(before[broken]), broken)
+            events = events.followed_by(silenced(lost, substeps * PHYSICS_DT))
+        self.key_events = self.key_events.followed_by(events.later(done * PHYSICS_DT))
 
     def state(self) -> NDArray[np.float64]:
         """(B, S) The state of each world, as `World.state` returns it."""

@@ -41,8 +41,14 @@ class KeyEvents(NamedTuple):
     time: NDArray[np.float64]
     speed: NDArray[np.float64]
 
+    def later(self, seconds: float) -> KeyEvents:
+        """These events, so much later [s]."""
+        return self._replace(time=self.time + seconds)
+
     def followed_by(self, others: KeyEvents) -> KeyEvents:
         """These events, then others."""
+        if not len(self.key) or not len(others.key):
+            return self if len(self.key) else others
         return KeyEvents(
             np.append(self.world, others.world),
             np.append(self.key, others.key),

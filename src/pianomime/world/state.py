@@ -138,23 +138,28 @@ def reset_pose_after_instability(qpos: NDArray[np.float64]) -> NDArray[np.float6
     return opened
 
 
-def controls_of_frame(ctrl: ArrayLike, *shape: int) -> NDArray[np.float64]:
-    """(..., S, 46) The controls of a frame, of which there may be one or several.
+def controls_of_frame(ctrl: ArrayLike, parts: int, *shape: int) -> NDArray[np.float64]:
+    """(S, ..., 46) The controls of a part of a frame, of which there may be one or several.
 
     Args:
-        ctrl: (..., 46), or (..., S, 46) with S a divisor of the physics steps of a frame.
+        ctrl: (..., 46), or (..., S, 46).
+        parts: of how many parts of the frame it is one.
         shape: (..., 46), without S.
 
     Raises:
-        ValueError: `ctrl` has another shape or is not finite.
+        ValueError: `ctrl` has another shape or is not finite, or the physics steps of a frame
+            cannot be divided among so many controls.
     """
     given = np.asarray(ctrl, float)
     if given.ndim != len(shape) + 1:
-        return finite(given, "ctrl", shape)[..., None, :]
-    parts = given.shape[-2]
-    if not parts or SUBSTEPS % parts:
-        raise ValueError(f"a frame of {SUBSTEPS} physics steps cannot have {parts} controls")
-    return finite(given, "ctrl", (*shape[:-1], parts, shape[-1]))
+        targets = finite(given, "ctrl", shape)[None]
+    else:
+        several = finite(given, "ctrl", (*shape[:-1], given.shape[-2], shape[-1]))
+        targets = np.moveaxis(several, -2, 0)
+    controls = len(targets) * parts
+    if controls < 1 or SUBSTEPS % controls:
+        raise ValueError(f"a frame of {SUBSTEPS} physics steps cannot have {controls} controls")
+    return targets
 
 
 def finite(values: ArrayLike, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -9,10 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.keyboard import KEYS
 from pianomime.world.key_sensor import NOTHING, sense, silenced
 from pianomime.world.model import SIDES, fingertip_sites, world_model
-from pianomime.world.parameters import SUBSTEPS
+from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS
 from pianomime.world.state import (
     BLOW_UP,
     RESETS,
@@ -70,36 +70,56 @@ class World(WorldState):
         start = starting_positions(qpos)
         self.blow_ups = 0
         self.pedal = False
+        self._substep = 0
         self._put(start)
         self._listen()
 
     def step(
-        self, ctrl: ArrayLike, pedal: bool = False, watch: Callable[[], None] | None = None
+        self,
+        ctrl: ArrayLike,
+        pedal: bool = False,
+        watch: Callable[[], None] | None = None,
+        parts: int = 1,
     ) -> None:
-        """Simulate one frame of 0.05 s with a constant control, or with several, each as long.
+        """Simulate one frame of 0.05 s, or one of the equal parts of a frame.
 
         Warns with `PhysicsWarning` when the physics becomes unstable, unless `quiet`.
 
         Args:
             ctrl: (46,) targets of the position actuators, right 23 then left 23 [rad, m];
-                MuJoCo clamps them to their ranges. Or (S, 46) to be sent one after the other; S
-                divides the 10 physics steps of a frame.
+                MuJoCo clamps them to their ranges. Or (S, 46) to be sent one after the other, each
+                for as long.
             pedal: whether the sustain pedal is down.
-            watch: called after each of the 10 physics steps, to read `data`.
+            watch: called after each physics step, of which a frame has 10, to read `data`.
+            parts: of how many equal parts of a frame one is simulated; S times `parts` divides 10.
+                Parts with one control each are, bit for bit, the frame with all of them.
 
         Raises:
-            ValueError: `ctrl` has another shape or is not finite.
+            ValueError: `ctrl` has another shape or is not finite, or a frame has no such parts.
         """
-        targets = controls_of_frame(ctrl, self.model.nu)
-        before = self.data.qpos.copy()
+        targets = controls_of_frame(ctrl, parts, self.model.nu)
         self.pedal = bool(pedal)
-        self._keep_pressed_keys_awake()
-        hold = SUBSTEPS // len(targets)
+        if self._substep == 0:
+            self._keep_pressed_keys_awake()
+        self.key_events, hold = NOTHING, SUBSTEPS // (len(targets) * parts)
+        for number, target in enumerate(targets):
+            self._hold(target, hold, number * hold, watch)
+        self._substep = (self._substep + len(targets) * hold) % SUBSTEPS
+
+    def _hold(
+        self,
+        target: NDArray[np.float64],
+        substeps: int,
+        done: int,
+        watch: Callable[[], None] | None,
+    ) -> None:
+        """Hold a control for some physics steps, after others in the same step."""
         qpos, qvel = self.data.qpos, self.data.qvel
-        moved = np.empty((2, SUBSTEPS + 1, 1, KEYS))
+        before = qpos.copy()
+        moved = np.empty((2, substeps + 1, 1, KEYS))
         moved[:, 0, 0] = qpos[:KEYS], qvel[:KEYS]
-        for substep in range(SUBSTEPS):
-            self.data.ctrl[:] = targets[substep // hold]
+        self.data.ctrl[:] = target
+        for substep in range(substeps):
             mujoco.mj_step(self.model, self.data)
             moved[:, substep + 1, 0] = qpos[:KEYS], qvel[:KEYS]
             if watch is not None:
@@ -107,11 +127,12 @@ class World(WorldState):
         if self._broken():
             self.blow_ups += 1
             if not self.quiet:
-                warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=2)
-            self.key_events = silenced(self.sounding[None], FRAME_SECONDS)
+                warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=3)
+            events = silenced(self.sounding[None], substeps * PHYSICS_DT)
             self._put(reset_pose_after_instability(before))
         else:
-            self.key_events = sense(moved[0], moved[1], self.sounding[None])
+            events = sense(moved[0], moved[1], self.sounding[None])
+        self.key_events = self.key_events.followed_by(events.later(done * PHYSICS_DT))
 
     def state(self) -> NDArray[np.float64]:
         """(S,) The simulation state, for `set_state` of any World or WorldBatch.
@@ -138,6 +159,7 @@ class World(WorldState):
         given = finite(state, "state", (mujoco.mj_stateSize(self.model, STATE),))
         self.blow_ups = 0
         self.pedal = False
+        self._substep = 0
         mujoco.mj_resetData(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, given, STATE)
         self._listen()
@@ -151,6 +173,7 @@ class World(WorldState):
         other = World(quiet)
         mujoco.mj_copyData(other.data, self.model, self.data)
         other.blow_ups, other.pedal = self.blow_ups, self.pedal
+        other._substep = self._substep
         other.sounding, other.key_events = self.sounding.copy(), self.key_events
         return other
 
