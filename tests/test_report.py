@@ -8,10 +8,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
 import made_up
@@ -22,7 +24,7 @@ from pianomime.evaluation.summary import summarize
 from pianomime.files import staged
 from pianomime.music import Score
 from pianomime.music.sound import Sound
-from pianomime.report import DARK, FILES, Theme, draw, write_report
+from pianomime.report import DARK, FILES, LIGHT, Theme, draw, write_report
 from pianomime.report.mp3 import write_mp3
 from pianomime.world.render import RenderUnavailable
 
@@ -184,6 +186,35 @@ def test_without_opengl_one_line_says_so_and_the_rest_is_there(
     assert notes == ["no film: install OpenGL"]
     assert (tmp_path / "report.html").exists()
     assert not (tmp_path / "performance.mp4").exists()
+
+
+def test_the_film_lights_what_sounds_and_tells_phantoms_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    score = Score(
+        np.array([40, 44]), np.array([0.0, 1.0]), np.array([0.5, 2.0]), np.array([64, 64])
+    )
+    # One is played late, one beside its key, for less than a frame and between two frames' ends.
+    performance = replace(
+        made_up.performance(score),
+        event_key=np.array([40, 45]),
+        event_on=np.array([0.06, 1.01]),
+        event_off=np.array([0.5, 1.04]),
+        event_speed=np.array([0.3, 0.3]),
+    )
+    films: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def film(path: Path, qpos: np.ndarray, sounding: np.ndarray, *_: object, **more: Any) -> None:
+        colours = [more["colours"](frame) for frame in range(len(sounding))]
+        films.append((sounding, np.array(colours)))
+
+    monkeypatch.setattr("pianomime.report.write.write_video", film)
+    write_report(performance, tmp_path, True, lambda *_: None, pytest.fail)
+    ((sounding, colours),) = films
+    lit = np.argwhere(sounding).tolist()
+    assert lit == [[frame, 40] for frame in range(1, 10)] + [[20, 45]]
+    red = (colours[..., :3] == np.float32(to_rgb(LIGHT.wrong))).all(axis=-1)
+    assert np.argwhere(red).tolist() == [[20, 45]]
 
 
 @pytest.mark.parametrize("seconds", [1.0, 60.0])
