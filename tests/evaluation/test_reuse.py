@@ -238,3 +238,26 @@ def _change_a_byte(path: Path) -> None:
 
 def _append(path: Path, text: str) -> None:
     path.write_text((path.read_text() if path.exists() else "") + text)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_means_are_of_songs_in_their_order_however_they_were_done(
+    reverse: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sums of floating-point numbers depend on it: a second run after a stop must come to the same."""
+    made = [{**ROW, "effort": number} for number in range(len(songs.names()))]
+    averaged = []
+
+    def work(function: str, items: list[Path], *_: Any, **__: Any) -> Iterator[Any]:
+        done = list(zip(items, made, strict=True))
+        yield from reversed(done) if reverse else done
+
+    def mean(rows: list[dict[str, Any]], measures: Any) -> Any:
+        averaged.extend(row["effort"] for row in rows)
+        return true_mean(rows, measures)
+
+    true_mean = evaluation.mean
+    monkeypatch.setattr(evaluation, "work", work)
+    monkeypatch.setattr(evaluation, "mean", mean)
+    evaluate(songs.names(), "zero-shot", out=tmp_path, jobs=1)
+    assert averaged == list(range(len(made)))

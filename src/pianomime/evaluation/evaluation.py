@@ -162,18 +162,19 @@ def evaluate(
                 rows[song] = row
                 report()
 
-        good = [row for row in rows.values() if "error" not in row]
-        means = mean(good, _MEASURES)
+        # In the order of the songs, not in that in which they were done: sums depend on it.
+        listed = [rows[song] for song in songs]
+        means = mean([row for row in listed if "error" not in row], _MEASURES)
         results = {
             "player": shown(player.name if isinstance(player, Player) else player),
             "effort": player.effort if isinstance(player, Player) else effort,
             "seed": None if isinstance(player, Player) else seed,
             "settings": chosen,
             "seconds": seconds if math.isfinite(seconds) else None,
-            "songs": [rows[song] for song in songs],
+            "songs": listed,
             "mean": means.value,
             "measured": means.songs,
-            "causes": _causes(list(rows.values())),
+            "causes": _causes(listed),
         }
         if store is not None:
             store.close(results)
