@@ -244,7 +244,7 @@ def _append(path: Path, text: str) -> None:
 def test_means_are_of_songs_in_their_order_however_they_were_done(
     reverse: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Sums of floating-point numbers depend on it: a second run after a stop must come to the same."""
+    """Sums depend on it, and a second run after a stop must come to the same."""
     made = [{**ROW, "effort": number} for number in range(len(songs.names()))]
     averaged = []
 
