@@ -47,7 +47,8 @@ THUMB, INDEX, MIDDLE, RING, LITTLE = range(5)
 def struck(*keys: int, lasts: int = 8, at_once: int = 1) -> Struck:
     """Keys that go down in frame 10, of a piece with so many keys in each frame."""
     value = np.arange(60) / at_once
-    return Struck(ONSET, np.array(keys), np.full(len(keys), ONSET + lasts), value)
+    ends = np.full(len(keys), ONSET + lasts)
+    return Struck(ONSET, np.array(keys), ends, value, unit=1 / at_once)
 
 
 def strike(**fingers: int) -> NDArray[np.int64]:
@@ -242,9 +243,33 @@ def test_a_note_that_costs_more_than_it_is_worth_is_left_out() -> None:
 
 def test_the_value_of_a_key_is_its_share_of_the_recall() -> None:
     score = score_of((40, 1, 8), (50, 2, 5), (60, 2, 5), (70, 2, 4))
-    value = np.diff(frame_values(score))
+    value = np.diff(frame_values(score, FingeringConfig()))
     np.testing.assert_allclose(value[:6], [1, 1, 1 / 4, 1 / 4, 1 / 3, 1])
     assert len(value) == score.frames() + 5
+
+
+def test_frames_have_a_price_and_another_under_the_pedal() -> None:
+    score = replace(score_of((40, 0, 8), (50, 0, 8)), pedal=np.array([[0.2, 0.3]]))
+    value = np.diff(frame_values(score, FingeringConfig(frame=0.2, pedalled=0.5)))
+    pedal = score.pedal_roll()
+    assert pedal.any()
+    assert not pedal.all()
+    np.testing.assert_allclose(value[:8], np.where(pedal, 0.05, 0.1)[:8])
+
+
+def test_the_frames_of_one_note_cost_so_much_at_most() -> None:
+    held = hand(over(WHITE, MIDDLE), {MIDDLE: WHITE}, since=0, until=ONSET + 6)
+    strikes, what = strike(middle=WHITE + 2), struck(WHITE + 2)
+    found = cost(held, strikes, what, cut=0.5, late=1e6, most_frames=2.0)
+    assert found.cost[0, 0] == pytest.approx(2 + 0.5, abs=1e-6)
+
+
+@pytest.mark.parametrize("most", [0, 2, 9])
+def test_a_hand_leaves_so_early_at_most(most: int) -> None:
+    was = hand(over(WHITE, MIDDLE), {MIDDLE: WHITE}, since=0, until=ONSET)
+    prices = {"travel_speed": 0.01, "late": 1e6, "early": most}
+    found = cost(was, strike(middle=FAR), struck(FAR), **prices)
+    assert found.early[0, 0] == most
 
 
 def test_out_of_reach_is_out_of_reach_at_any_price() -> None:

@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.keyboard import KEYS
+from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.music import Score
+from pianomime.music.voices import BASS, MELODY, voices
 from pianomime.plan.fingering_cost import (
     LATE,
     FingeringConfig,
@@ -81,7 +82,8 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     )
     if not len(score):
         return fingering
-    value = frame_values(score)
+    value = frame_values(score, config)
+    factor = _voice_factors(score, config)
     beam = _Beam.start()
     history = []
     onsets, event = np.unique(frames[:, 0], return_inverse=True)
@@ -94,10 +96,13 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
         # A note that covers no frame is fingered as if it had one.
         ends = np.full(len(keys), onset + 1)
         np.maximum.at(ends, voice, frames[group, 1])
+        weight = np.zeros(len(keys))
+        np.maximum.at(weight, voice, factor[group])
         outer = np.ones(len(keys), bool)
         outer[FINGER_COUNT : len(keys) - FINGER_COUNT] = False
-        struck = Struck(int(onset), keys[outer], ends[outer], value)
-        beam, choice = beam.extend(struck, config)
+        unit = 1.0 if config.by_note else float(value[onset + 1] - value[onset])
+        struck = Struck(int(onset), keys[outer], ends[outer], value, unit)
+        beam, choice = beam.extend(struck, weight[outer], config)
         place = np.where(outer, np.cumsum(outer) - 1, -1)[voice]
         history.append((onset, group, place, choice))
     row = int(np.argmin(beam.cost))
@@ -121,14 +126,24 @@ def find_fingering(score: Score, config: FingeringConfig | None = None) -> Finge
     return fingering
 
 
-def frame_values(score: Score) -> NDArray[np.float64]:
+def frame_values(score: Score, config: FingeringConfig) -> NDArray[np.float64]:
     """(T + 1 + LATE,) Value of a key that is down in all frames before each.
 
-    In one frame it is one over the number of keys that should be down. The last `LATE` entries
-    are for frames after the end, into which a note that begins late may reach.
+    In one frame it is one over the number of keys that should be down, times the costs of a frame.
+    The last `LATE` entries are for frames after the end, into which a note that begins late may
+    reach.
     """
     keys = np.concatenate([score.roll().sum(axis=1), np.zeros(LATE)])
-    return np.concatenate([[0.0], np.cumsum(1.0 / np.maximum(keys, 1))])
+    pedal = np.concatenate([score.pedal_roll(), np.zeros(LATE, bool)])
+    value = config.frame * np.where(pedal, config.pedalled, 1.0) / np.maximum(keys, 1)
+    return np.concatenate([[0.0], np.cumsum(value)])
+
+
+def _voice_factors(score: Score, config: FingeringConfig) -> NDArray[np.float64]:
+    """(N,) Factor of the cost of leaving each note out."""
+    factors = np.ones(3)
+    factors[[MELODY, BASS]] = config.melody, config.bass
+    return factors[voices(score, FRAME_SECONDS)]
 
 
 class _Choice(NamedTuple):
@@ -162,8 +177,16 @@ class _Beam:
             np.array([[-0.14, 0.14]]),
         )
 
-    def extend(self, struck: Struck, config: FingeringConfig) -> tuple[_Beam, _Choice]:
-        """Try every way to play the notes struck in one frame, and keep the cheapest."""
+    def extend(
+        self, struck: Struck, factor: NDArray[np.float64], config: FingeringConfig
+    ) -> tuple[_Beam, _Choice]:
+        """Try every way to play the notes struck in one frame, and keep the cheapest.
+
+        Args:
+            struck: the M notes.
+            factor: (M,) of the cost of leaving each out.
+            config: the costs.
+        """
         options, pairs = _options_in_reach(struck.keys, config)
         hands = []
         for side in (LEFT, RIGHT):
@@ -176,7 +199,8 @@ class _Beam:
         # (P, M): who plays each note.
         mine, other = options[LEFT][pairs[:, LEFT]], options[RIGHT][pairs[:, RIGHT]]
         assigned = np.where(mine >= 0, mine, np.where(other >= 0, other + FINGER_COUNT, -1))
-        left_out = config.drop * struck.unit + struck.lost(struck.onset, struck.ends)
+        frames = np.minimum(struck.lost(struck.onset, struck.ends), config.most_frames)
+        left_out = config.drop * struck.unit * factor + frames
         apart = right.centre[:, pairs[:, RIGHT]] - left.centre[:, pairs[:, LEFT]]
         total = self.cost[:, None] + (assigned < 0) @ left_out
         total += left.cost[:, pairs[:, LEFT]] + right.cost[:, pairs[:, RIGHT]]

@@ -3,6 +3,10 @@
 To strike a key is to press it at the onset of a note. All costs are in key-frames, the expected
 number of wrong keys summed over frames. A key-frame has the *value* 1/n where n keys should be
 down in its frame, because that is its share of the frame's recall.
+
+What counts is either frames, as in the paper's metric, or notes, as for an ear: `FingeringConfig()`
+and `FingeringConfig.notes()`. Where notes count, each is worth as much in a full chord as alone,
+and short as long.
 """
 
 from __future__ import annotations
@@ -24,13 +28,13 @@ from pianomime.world.parameters import key_centres
 
 _LIFT = 0.01
 """[m] Way up and down that a finger makes in addition when it changes keys."""
-EARLY, LATE = 4, 5
-"""A hand leaves 0 to 3 frames before an onset and arrives 0 to 4 frames after it."""
+LATE = 5
+"""A hand arrives 0 to 4 frames after an onset."""
 
 
 @dataclass(frozen=True)
 class FingeringConfig:
-    """Costs of the fingering search, in key-frames."""
+    """Costs of the fingering search, in key-frames; by default those where frames count."""
 
     beam: int = 80
     """Number of partial fingerings kept after each onset."""
@@ -40,6 +44,21 @@ class FingeringConfig:
     """Cost of releasing a held note early, in addition to the frames it loses."""
     late: float = 1.5
     """Cost of a note that begins late, in addition to the frames it loses."""
+    by_note: bool = False
+    """Whether all costs but those of frames are the same however many keys should be down; else
+    they are shared among these, as frames are."""
+    melody: float = 1.0
+    """Factor of the cost of a melody note that no finger plays."""
+    bass: float = 1.0
+    """Factor of the cost of a bass note that no finger plays."""
+    frame: float = 1.0
+    """Cost of a frame in which a key is missed, shared among the keys that should be down."""
+    pedalled: float = 1.0
+    """Factor of the cost of a frame in which the pedal is down, and a key sounds on by itself."""
+    most_frames: float = 1e9
+    """Greatest cost of the frames of one note that is not played, or released early."""
+    early: int = 3
+    """Frames before an onset at which a hand may leave the keys it holds, at most."""
     stretch: float = 4.0
     """Cost of two fingers at the limit of their reach; grows with the fourth power of the reach."""
     strain: float = 1.0
@@ -63,8 +82,29 @@ class FingeringConfig:
         whole_numbers(self)
         finite(self)
         within("beam", self.beam, 1)
+        within("early", self.early, 0)
         for name in ("travel_speed", "hop_speed"):
             above_zero(name, getattr(self, name))
+
+    @classmethod
+    def notes(cls) -> FingeringConfig:
+        """Costs where notes count.
+
+        An ear misses a note that is not struck, be it short or long, in a full chord or alone, and
+        outer voices first; it hardly hears a long note end early, less so under the pedal.
+        """
+        return cls(
+            beam=200,
+            by_note=True,
+            melody=2.5,
+            bass=2.5,
+            frame=0.4,
+            pedalled=0.6,
+            most_frames=2.0,
+            late=4.0,
+            early=5,
+            travel_speed=0.35,
+        )
 
 
 class Struck(NamedTuple):
@@ -75,17 +115,14 @@ class Struck(NamedTuple):
         keys: (M,) the keys, low to high.
         ends: (M,) frame after the last one in which each key should be down.
         value: (T + 1 + LATE,) value of a key that is down in all frames before each.
+        unit: factor of every cost but that of frames.
     """
 
     onset: int
     keys: NDArray[np.int64]
     ends: NDArray[np.int64]
     value: NDArray[np.float64]
-
-    @property
-    def unit(self) -> float:
-        """Value of a key-frame at the onset."""
-        return float(self.value[self.onset + 1] - self.value[self.onset])
+    unit: float
 
     def lost(
         self, first: NDArray[np.int64] | int, end: NDArray[np.int64] | int
@@ -186,7 +223,8 @@ def hand_cost(
 
     # A finger releases its key where holding it costs more, or where it has to strike another.
     holding = struck.unit * _holding_cost(side, strikes, np.where(held, fingers.key, KEYS), config)
-    rest = struck.lost(struck.onset, fingers.until) + config.cut * struck.unit
+    rest = np.minimum(struck.lost(struck.onset, fingers.until), config.most_frames)
+    rest += config.cut * struck.unit
     rest = np.where(held, rest, 0.0)[:, None]
     release = held[:, None] & (strike | (holding > rest))
     kept = held[:, None] & ~release
@@ -257,10 +295,10 @@ def _travel_cost(
     held: NDArray[np.bool_] = fingers.until > onset
     freed = np.where(held, 0, fingers.until).max(axis=1)[:, None]
     gap = onset - np.where(released, onset, freed)  # (B, O) frames without a held key
-    early = np.arange(EARLY)[:, None, None]
+    early = np.arange(config.early + 1)[:, None, None]
     late = np.arange(LATE)
 
-    # (EARLY, LATE, B, O)
+    # (E, LATE, B, O)
     seconds = (np.maximum(gap, early)[:, None] + late[:, None, None] + 1) * FRAME_SECONDS
     effort = (distance / seconds / config.travel_speed) ** 2
     # A hand's first notes are not dropped for the way to them: no other notes pay for it.
@@ -290,7 +328,7 @@ def _travel_cost(
     delay = struck.lost(onset, onset + late) + config.late * unit * (late > 0)
     total += np.where(late[:, None] < shortest, notes * delay[:, None], np.inf)[:, None]
 
-    flat = total.reshape(EARLY * LATE, *distance.shape)
+    flat = total.reshape(len(early) * LATE, *distance.shape)
     best = np.where(notes > 0, flat.argmin(axis=0), 0)
     least = np.take_along_axis(flat, best[None], axis=0)[0]
     return np.where(notes > 0, least, 0.0), *np.divmod(best, LATE)
