@@ -213,6 +213,54 @@ def test_grid_times_are_exact_for_hours() -> None:
     assert (frames[order, 1] == first + 1).all()
 
 
+def near(frame: int, steps: int) -> float:
+    """A time so many floats beside the edge of a frame, as sums of times are."""
+    time = frame / 20
+    for _ in range(abs(steps)):
+        time = np.nextafter(time, np.inf if steps > 0 else 0.0)
+    return float(time)
+
+
+EDGES = st.builds(near, st.integers(1, 120), st.integers(-3, 3))
+
+
+@given(st.lists(st.tuples(st.integers(0, 87), EDGES, EDGES), min_size=1), st.integers(1, 400))
+def test_a_delay_of_whole_frames_is_as_many_silent_frames(
+    notes: list[tuple[int, float, float]], frames: int
+) -> None:
+    key, one, other = (np.array(column) for column in zip(*notes, strict=True))
+    pedal = [[min(one[0], other[0]), max(one[0], other[0])]]
+    on, off = np.minimum(one, other), np.maximum(one, other)
+    score = Score(key, on, off, np.full(len(key), 64), np.array(pedal))
+    later = score.delay(frames / 20)
+    silent = (frames, 0)
+    np.testing.assert_array_equal(later.roll(), np.pad(score.roll(), (silent, (0, 0))))
+    assert later.duration == pytest.approx(score.duration + frames / 20, abs=1e-12)
+    np.testing.assert_allclose(later.onset, np.sort(on) + frames / 20, rtol=0, atol=1e-12)
+
+
+@given(scores(), st.integers(1, 40))
+def test_a_delay_keeps_the_pedal_in_its_frames(score: Score, frames: int) -> None:
+    later = score.delay(frames / 20)
+    np.testing.assert_array_equal(
+        later.pedal_roll(), np.pad(score.pedal_roll(), (frames, 0)), strict=True
+    )
+    np.testing.assert_array_equal(later.velocity, score.velocity)
+
+
+def test_a_delay_may_be_any_time_and_none_changes_nothing() -> None:
+    score = Score([0, 3], [0.5, 1.0], [1.5, 1.25], [64, 70], [[0.1, 0.7]], "a title", ("a remark",))
+    assert score.delay(0.0) is score
+    later = score.delay(0.33)
+    np.testing.assert_array_equal(later.onset, score.onset + 0.33)
+    np.testing.assert_array_equal(later.offset, score.offset + 0.33)
+    np.testing.assert_array_equal(later.pedal, score.pedal + 0.33)
+    assert (later.title, later.remarks) == (score.title, score.remarks)
+    for wrong in (-0.5, float("nan"), float("inf"), 4 * 3600.0):
+        with pytest.raises(ScoreError):
+            score.delay(wrong)
+
+
 def test_empty_roll_is_an_empty_score() -> None:
     score = Score.from_roll(np.zeros((10, 88), bool))
     assert len(score) == 0
@@ -220,7 +268,7 @@ def test_empty_roll_is_an_empty_score() -> None:
     assert score.roll().shape == (1, 88)
     assert score.pedal_roll().shape == (1,)
     assert score.note_frames().shape == (0, 2)
-    assert len(score.trim_silence()) == 0
+    assert len(score.trim_silence()) == len(score.delay(0.5)) == 0
 
 
 def test_roll_of_another_shape_is_refused() -> None:

@@ -48,6 +48,19 @@ def test_excerpts_that_make_no_sense_are_refused(
         excerpt(two_notes(), start, seconds)
 
 
+def test_a_lead_in_is_silence_before_the_music() -> None:
+    part = excerpt(two_notes(), seconds=4.5, lead_in=0.7)
+    np.testing.assert_allclose(part.onset, [0.7, 4.7])
+    np.testing.assert_allclose(part.offset, [1.7, 5.2])
+    np.testing.assert_allclose(part.pedal, [[0.7, 1.2]])
+
+
+@pytest.mark.parametrize("lead_in", [-0.1, float("nan"), float("inf"), 1e9])
+def test_lead_ins_that_make_no_sense_are_refused(lead_in: float) -> None:
+    with pytest.raises(InputError, match="lead-in must be 0 to 14400 s"):
+        excerpt(two_notes(), lead_in=lead_in)
+
+
 class NoPlanner:
     """Plans nothing."""
 

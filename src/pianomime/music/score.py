@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pianomime.errors import InputError
-from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.keyboard import FRAME_RATE, FRAME_SECONDS, KEYS
 from pianomime.short_repr import count, short_repr
 from pianomime.shown import shown
 
@@ -185,6 +185,29 @@ class Score:
             pedal=_cut_pedal(self.pedal, start, math.inf),
         )
 
+    def delay(self, seconds: float) -> Score:
+        """The same music after some silence.
+
+        Where the silence is whole frames, the rolls are the same after as many silent frames:
+        times that are a rounding error off the edge of a frame stay on their side of it.
+
+        Args:
+            seconds: of silence; 0 gives this very score.
+
+        Raises:
+            ScoreError: the silence is negative or no number, or the score gets too long.
+        """
+        if not 0 <= seconds <= MAX_SECONDS:
+            raise ScoreError(f"cannot delay music by {seconds:g} s")
+        if not seconds:
+            return self
+        return replace(
+            self,
+            onset=_later(self.onset, seconds),
+            offset=_later(self.offset, seconds),
+            pedal=_later(self.pedal, seconds),
+        )
+
     def transpose(self, semitones: int) -> Score:
         """The same music transposed.
 
@@ -300,6 +323,23 @@ def _rate(dt: float) -> float:
     if not dt > 0:
         raise ValueError(f"dt must be positive, not {dt}")
     return 1.0 / dt
+
+
+def _later(times: NDArray[np.float64], seconds: float) -> NDArray[np.float64]:
+    """Times after a delay [s]; if that is whole frames, each has the same place in its frame."""
+    later, frames = times + seconds, seconds * FRAME_RATE
+    if not frames.is_integer():
+        return later
+    first = np.floor(times * FRAME_RATE) + frames
+    last = np.ceil(times * FRAME_RATE) + frames
+    on_edge = first == last
+    later[on_edge] = first[on_edge] / FRAME_RATE
+    # The sum was rounded to the nearest number, so a few steps lead off an edge that it fell on.
+    while (low := ~on_edge & (later * FRAME_RATE <= first)).any():
+        later[low] = np.nextafter(later[low], np.inf)
+    while (high := ~on_edge & (later * FRAME_RATE >= last)).any():
+        later[high] = np.nextafter(later[high], 0.0)
+    return later
 
 
 def _tidy_pedal(pedal: ArrayLike) -> NDArray[np.float64]:
