@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from pianomime import songs
+from pianomime import Performance, songs
 from pianomime.cli import COMMANDS, main
 from pianomime.errors import TrainingDiverged
 
@@ -81,7 +81,9 @@ def test_play_writes_the_whole_report(capsys: pytest.CaptureFixture[str]) -> Non
     row = json.loads(Path("out/report.json").read_text(encoding="utf-8"))
     assert row["player"] == "zero-shot"
     assert 0 < row["f1"] <= 1
-    assert row["song_seconds"] == pytest.approx(2.0, abs=0.1)
+    # Half a second of silence, then two of music.
+    assert row["song_seconds"] == pytest.approx(2.5, abs=0.1)
+    assert Performance.load("out/performance.npz").score.onset[0] == 0.5
     with wave.open("out/performance.wav") as sound:
         assert sound.getnframes() / sound.getframerate() >= 1.5
     assert str(Path("out/report.html")) in capsys.readouterr().out
@@ -116,6 +118,9 @@ def test_what_cannot_be_played_is_one_line(capsys: pytest.CaptureFixture[str]) -
         (["--seconds", "-1"], "seconds must be more than 0"),
         (["--start", "-1"], "start must be 0 or more"),
         (["--start", "9999"], "nothing to play from 9999 s"),
+        (["--lead-in", "-1"], "lead-in must be 0 to"),
+        (["--lead-in", "nan"], "lead-in must be 0 to"),
+        (["--lead-in", "inf"], "lead-in must be 0 to"),
         (["-o", "file"], "file: is a file"),
         (["-o", "file/below"], "file: is a file"),
         (["-o", "/proc/pianomime/out"], "/proc/pianomime/out: cannot be written"),

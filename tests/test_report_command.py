@@ -114,6 +114,8 @@ def test_a_player_of_one_excerpt_takes_what_it_was_trained_with(
     song = ["ode-to-joy", "--player", "one-excerpt"]
     trained = ["--start", "0.5", "--seconds", "1", "--effort", "0"]
     main(["play", *song, *trained, "--no-video", "-o", "played"])
+    # It begins with the music; of half a second before it, the default, nothing is left.
+    assert Performance.load("played/performance.npz").score.onset[0] == 0.0
     main(["evaluate", *song, "--seconds", "1", "-o", "evaluated"])
     for command in ("play", "evaluate"):
         told = fails([command, *song, "--seconds", "2", "-o", "other"], capsys)
@@ -121,4 +123,8 @@ def test_a_player_of_one_excerpt_takes_what_it_was_trained_with(
         assert "1" in told
     assert "--start" in fails(["play", *song, "--start", "1", "-o", "other"], capsys)
     assert "--effort" in fails(["play", *song, "--effort", "2", "-o", "other"], capsys)
+    for command in ("play", "evaluate"):
+        told = fails([command, *song, "--lead-in", "0.5", "-o", "other"], capsys)
+        assert "lead-in 0.5: one-excerpt plays music of its own" in told
+    main(["play", *song, "--lead-in", "0", "--no-video", "-o", "played"])
     assert sorted(os.listdir()) == ["evaluated", "played"]

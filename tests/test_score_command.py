@@ -13,7 +13,7 @@ import pytest
 import made_up
 from pianomime.cli import main
 from pianomime.evaluation.summary import summarize
-from pianomime.music import Score
+from pianomime.music import Score, excerpt
 
 
 @pytest.fixture(autouse=True)
@@ -89,6 +89,25 @@ def test_silence_before_the_song_is_no_part_of_a_playing_unless_it_is_said_so(
     assert f1("same.mid", "--no-trim", "--start", "5", "--seconds", "10") == 1.0
 
 
+def test_a_lead_in_is_silence_that_is_due(capsys: pytest.CaptureFixture[str]) -> None:
+    song(begins=2.0).to_midi("song.mid")
+    song(begins=0.5).to_midi("played.mid")
+
+    def music(*arguments: str) -> Any:
+        return scored([*arguments, "--against", "song.mid"], capsys)["music"]
+
+    assert music("played.mid")["note_f1_50"] == 0.0
+    due = music("played.mid", "--lead-in", "0.5")
+    assert due["note_f1_10"] == 1.0
+    # The last note of 30 s is there, too.
+    assert due["notes"] == due["strikes"] == 60
+    # A performance says itself when it was due.
+    score = excerpt(Score.from_midi("song.mid"), seconds=8.0, lead_in=0.5)
+    made_up.performance(score, mistakes=0.0).save("performance.npz")
+    assert music("performance.npz", "--seconds", "8")["note_f1_10"] == 1.0
+    assert music("performance.npz", "--seconds", "8", "--lead-in", "0")["note_f1_50"] == 0.0
+
+
 def test_the_table_names_every_measure_with_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
     song().to_midi("[red]song.mid")
     main(["score", "[red]song.mid", "--against", "[red]song.mid"])
@@ -115,6 +134,11 @@ def test_what_cannot_be_scored_is_one_line(capsys: pytest.CaptureFixture[str]) -
     assert "no-such-song" in fails(["song.mid", "--against", "no-such-song"], capsys)
     assert "--start is a part of a song" in fails(["performance.npz", "--start", "1"], capsys)
     assert "--trim" in fails(["performance.npz", "--no-trim"], capsys)
+    assert "--lead-in is a part" in fails(["performance.npz", "--lead-in", "0.5"], capsys)
+    given = ["song.mid", *against, "--lead-in"]
+    assert "time runs alike" in fails([*given, "0.5", "--no-trim"], capsys)
+    for bad in ("-1", "nan", "inf"):
+        assert "lead-in must be 0 to" in fails([*given, bad], capsys)
     for bad in ("-1", "nan", "0"):
         assert fails(["song.mid", *against, "--seconds", bad], capsys)
         assert fails(["song.mid", *against, "--no-trim", "--seconds", bad], capsys)

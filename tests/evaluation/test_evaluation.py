@@ -11,9 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from pianomime import evaluate, songs
+from pianomime import Performance, evaluate, songs
 from pianomime.errors import InputError
 from pianomime.evaluation.song_worker import SONG_WORKER, song_request
 from pianomime.evaluation.table import markdown
@@ -43,9 +44,9 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    asked = {"player", "effort", "seed", "settings", "seconds"}
+    asked = {"player", "effort", "seed", "settings", "seconds", "lead_in"}
     assert set(results) == asked | {"songs", "mean", "measured", "causes"}
-    assert results["seconds"] == 1.0
+    assert (results["seconds"], results["lead_in"]) == (1.0, 0.0)
     rows = {row["song"]: row for row in results["songs"]}
     assert list(rows) == sorted(path.stem for path in folder.iterdir())
     broken = rows.pop("broken|one")
@@ -114,6 +115,28 @@ def test_finished_songs_are_not_played_again(folder: Path, tmp_path: Path) -> No
     assert len(list((out / "songs").glob("*.json"))) == 5 + 3
 
 
+def test_a_lead_in_is_another_result_and_no_part_of_the_seconds(tmp_path: Path) -> None:
+    name = songs.names()[0]
+    none = evaluate(name, "zero-shot-ik", seconds=1.0, jobs=1, out=tmp_path)
+    half = evaluate(name, "zero-shot-ik", seconds=1.0, lead_in=0.5, jobs=1, out=tmp_path)
+    assert (none["lead_in"], half["lead_in"]) == (0.0, 0.5)
+    assert len(list(tmp_path.glob("songs/*.json"))) == 2
+    (before,), (after,) = none["songs"], half["songs"]
+    assert after["frames"] == before["frames"] + 10
+    assert after["notes"] == before["notes"]
+    scores = [
+        Performance.load(tmp_path / row["performance"]).score.roll() for row in (before, after)
+    ]
+    np.testing.assert_array_equal(scores[1], np.pad(scores[0], ((10, 0), (0, 0))))
+    # An int is the same time.
+    for lead_in in (0, 0.5):
+        evaluate(name, "zero-shot-ik", seconds=1.0, lead_in=lead_in, jobs=1, out=tmp_path)
+    assert len(list(tmp_path.glob("songs/*.json"))) == 2
+    for wrong in (-1.0, float("nan"), float("inf")):
+        with pytest.raises(InputError, match="lead-in must be"):
+            evaluate(name, lead_in=wrong, out=tmp_path)
+
+
 @pytest.mark.parametrize(
     "damage", ["F1 edited", "F1 as text", "a list", "nested", "another's", "empty"]
 )
@@ -167,7 +190,8 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
 
 def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
-    setup = {"player": "zero-shot", "effort": 0, "seed": 0, "settings": {}, "seconds": 1.0}
+    setup = {"player": "zero-shot", "effort": 0, "seed": 0, "settings": {}}
+    setup |= {"seconds": 1.0, "lead_in": 0.0}
     with Worker(SONG_WORKER, setup) as worker:
         assert "f1" in worker.ask(song_request(song, None))
         os.kill(worker.pid, signal.SIGKILL)

@@ -14,6 +14,7 @@ from pianomime.evaluation.diagnose import diagnose
 from pianomime.music import Score
 from pianomime.plan import ZeroShotPlanner
 from pianomime.plan.demonstration import Demonstration
+from pianomime.players.casting import Casting
 
 SONG = songs.names()[0]
 
@@ -84,6 +85,24 @@ def test_demonstrations_are_played_by_their_own_plan(demo: Path, tmp_path: Path)
     assert performance.plan is not None
     np.testing.assert_array_equal(performance.plan.fingertips, excerpt.plan.fingertips)
     assert results == evaluate([demo, midi], "demonstration-ik", seconds=1.5, jobs=1, out=out)
+
+
+def test_plans_of_demonstrations_take_no_lead_in(demo: Path, tmp_path: Path) -> None:
+    shown = Demonstration.load(demo)
+    made = load_player("demonstration-ik", demonstration=shown)
+    for player in ("demonstration", "demonstration-ik", str(demo), made):
+        with pytest.raises(InputError, match="plays music of its own, from the first note on"):
+            evaluate(demo, player, lead_in=0.5, out=tmp_path / "out")
+        casting = Casting.of(player, 0, 0)
+        assert not casting.takes_lead_in
+        _, score = casting.cast(demo, 0.0, 5.0, 0.0)
+        np.testing.assert_array_equal(score.onset, shown.excerpt().score.onset)
+    assert not (tmp_path / "out").exists()
+    # What plays a demonstration's notes by a plan of its own can wait.
+    casting = Casting.of("zero-shot-ik", 0, 0)
+    assert casting.takes_lead_in
+    (_, score), (_, later) = (casting.cast(demo, 0.0, 1.5, lead_in) for lead_in in (0.0, 0.5))
+    np.testing.assert_array_equal(later.roll(), np.pad(score.roll(), ((10, 0), (0, 0))))
 
 
 def test_other_players_play_the_notes_of_a_demonstration(demo: Path, tmp_path: Path) -> None:

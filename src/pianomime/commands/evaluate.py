@@ -34,6 +34,7 @@ class Evaluate:
       pianomime evaluate FOLDER
       pianomime evaluate FOLDER more/SONG.mid fur-elise -o out/all --jobs 4
       pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
+      pianomime evaluate FOLDER --lead-in 0.5
       pianomime evaluate DEMO.npz DEMOS/*.npz --player demonstration
       pianomime evaluate FOLDER --player my_module:make_player --planner.beam 200
     """
@@ -56,6 +57,9 @@ class Evaluate:
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """How much of each song to play at most, from its first note [s]."""
+    lead_in: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
+    """Silence before the first note, in which the hands get to their keys [s]: 0 in the paper's
+    protocol; 0.5 as `pianomime play` has it. It is no part of --seconds."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
     """Songs played at the same time; one a core if not given. They slow each other down: compare
     real time only between runs with the same N."""
@@ -90,6 +94,7 @@ class Evaluate:
                 seed=self.seed,
                 settings=self.settings,
                 seconds=self.seconds,
+                lead_in=self.lead_in,
                 jobs=self.jobs,
                 out=out,
                 progress=progress,

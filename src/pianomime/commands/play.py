@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from pianomime.commands.report import make_report
-from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.keyboard import EXCERPT_SECONDS, LEAD_IN_SECONDS
 
 if TYPE_CHECKING:
     from pianomime.music import Score
@@ -39,6 +39,7 @@ class Play:
       pianomime play SONG.mid -o out/song --no-video
       pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
+      pianomime play SONG.mid --lead-in 0
       pianomime play DEMO.npz --player demonstration-ik
       pianomime play SONG.mid --player RUN
       pianomime play SONG.mid --player my_module:make_player --seed 1
@@ -68,6 +69,9 @@ class Play:
     """How much to play at most, from what sounds at START or first after it [s]."""
     start: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0
     """Where in the song to begin [s]."""
+    lead_in: Annotated[float | None, tyro.conf.arg(metavar="S", help_behavior_hint="")] = None
+    """Silence before the first sound, in which the hands get to their keys [s]; it is no part of
+    --seconds. 0.5 if not given, and 0 for experts and plans of demonstrations, which have none."""
     video: bool = True
     """Render a film, where this machine can."""
 
@@ -94,7 +98,10 @@ class Play:
         shown = path.suffix == ".npz"
         name = self.player or ("demonstration" if shown else "zero-shot")
         casting = Casting.of(name, self.effort, self.seed, **self.settings)
-        player, score = casting.cast(path, self.start, self.seconds)
+        lead_in = self.lead_in
+        if lead_in is None:
+            lead_in = LEAD_IN_SECONDS if casting.takes_lead_in else 0.0
+        player, score = casting.cast(path, self.start, self.seconds, lead_in)
         if player.excerpt is not None:
             start, seconds = player.excerpt
             trained = {"start": start, "seconds": seconds, "effort": player.effort}

@@ -24,6 +24,7 @@ class ScorePlaying:
     Examples:
       pianomime score out/fur-elise/performance.npz
       pianomime score PLAYED.mid --against SONG.mid
+      pianomime score performance.mid --against SONG.mid --lead-in 0.5
       pianomime score PLAYED.mid --against SONG.mid --no-trim --seconds inf --json
     """
 
@@ -36,9 +37,14 @@ class ScorePlaying:
     """Where in SONG the playing begins [s]."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
     """How much of SONG to score at most [s]; inf for all of it."""
+    lead_in: Annotated[float | None, tyro.conf.arg(metavar="S", help_behavior_hint="")] = None
+    """How long PLAYED is silent before its first sound is due [s], as `pianomime play --lead-in`
+    has it: 0.5 in its performance.mid. If not given, 0 for MIDI files, and what a performance's own
+    score has."""
     trim: bool = True
-    """Whether PLAYED begins with the first sound of SONG at or after START, as what `pianomime
-    play` writes does. Otherwise time runs alike in both files, from their beginnings."""
+    """Whether PLAYED begins with LEAD-IN and the first sound of SONG at or after START, as what
+    `pianomime play` writes does. Otherwise time runs alike in both files, from their
+    beginnings."""
     json: bool = False
     """Print JSON: `song`, `protocol` and the object `music`."""
 
@@ -85,9 +91,10 @@ class ScorePlaying:
 
         performance = Performance.load(self.played) if self.played.suffix == ".npz" else None
         if self.against is None:
-            for name in ("start", "seconds", "trim"):
+            for name in ("start", "seconds", "lead_in", "trim"):
                 if getattr(self, name) != getattr(ScorePlaying, name):
-                    raise InputError(f"--{name} is a part of a song: name that with --against")
+                    option = name.replace("_", "-")
+                    raise InputError(f"--{option} is a part of a song: name that with --against")
             if performance is None:
                 raise InputError(
                     f"{self.played}: say what was to be played with --against SONG.mid"
@@ -95,8 +102,13 @@ class ScorePlaying:
             return performance.score, performance.played()
         song = Score.from_midi(find_song(self.against))
         played = Score.from_midi(self.played) if performance is None else performance.played()
-        if self.trim:
-            score, begins = excerpt(song, self.start, self.seconds), 0.0
-        else:
-            score, begins = song.clip(self.start, self.start + self.seconds), self.start
-        return score, played.clip(begins, begins + self.seconds)
+        if not self.trim:
+            if self.lead_in is not None:
+                raise InputError("--lead-in: with --no-trim, time runs alike in both files")
+            begins, ends = self.start, self.start + self.seconds
+            return song.clip(begins, ends), played.clip(begins, ends)
+        lead_in = 0.0 if self.lead_in is None else self.lead_in
+        if self.lead_in is None and performance is not None and len(performance.score):
+            lead_in = float(performance.score.onset[0])
+        score = excerpt(song, self.start, self.seconds, lead_in)
+        return score, played.clip(0.0, lead_in + self.seconds)

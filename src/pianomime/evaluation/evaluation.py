@@ -55,6 +55,7 @@ def evaluate(
     seed: int = 0,
     settings: Mapping[str, Any] | None = None,
     seconds: float = EXCERPT_SECONDS,
+    lead_in: float = 0.0,
     jobs: int | None = None,
     out: str | Path | None = None,
     progress: Progress = no_progress,
@@ -76,6 +77,8 @@ def evaluate(
         seed: of everything that is random.
         settings: of the player, as `load_player` takes them.
         seconds: how much of each song to play at most, from its first note [s].
+        lead_in: silence before the first note [s], as in `pianomime.excerpt`; 0 is the paper's
+            protocol.
         jobs: processes; one a core that this one may use if None. They share the cores, so
             `realtime_factor` and the times depend on it.
         out: folder for `results.json` and `results.md`, and the finished songs with their
@@ -83,16 +86,16 @@ def evaluate(
         progress: called with the songs done, the songs in all and their mean F1 so far.
 
     Returns:
-        What `results.json` holds: `player`, `effort`, `seed`, `settings` and `seconds` as asked for
-        (None: whole songs), `songs` (a row each, in the order of `paths`), `mean` (of whatever was
-        measured, over the songs that did not fail and in which there was something to measure;
-        empty if all failed), `measured` (of how many songs each mean is) and `causes` (`missed`
-        and `wrong`: the share of the key-frames wanted in all songs that each cause cost, the
-        costliest first).
+        What `results.json` holds: `player`, `effort`, `seed`, `settings`, `seconds` (None: whole
+        songs) and `lead_in` as asked for, `songs` (a row each, in the order of `paths`), `mean` (of
+        whatever was measured, over the songs that did not fail and in which there was something to
+        measure; empty if all failed), `measured` (of how many songs each mean is) and `causes`
+        (`missed` and `wrong`: the share of the key-frames wanted in all songs that each cause cost,
+        the costliest first).
 
     Raises:
         InputError: a path stands for no song, or there is no such player or setting, or its
-            files cannot be read.
+            files cannot be read, or it takes no lead-in.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
@@ -113,12 +116,14 @@ def evaluate(
                 f"seconds: this player plays the {trained:g} s that it was trained on, not "
                 f"{seconds:g}"
             )
+    casting.check_lead_in(lead_in)
     # Other processes cannot load such a player, and nobody can tell what it depends on.
     only_here = isinstance(player, Player) or is_registered(player)
     made_by = ""
     if not only_here:
         files = files_digest(player_files(str(player)))
-        key = [str(player), effort, seed, chosen, f"{seconds:g}", files, protocol_digest()]
+        part = f"{seconds:g}", float(lead_in)
+        key = [str(player), effort, seed, chosen, *part, files, protocol_digest()]
         made_by = f"{json.dumps(key, sort_keys=True)} {_program_hash()}"
     store = None if out is None else _Store(Path(out), made_by)
     with nullcontext() if store is None else store.held():
@@ -144,7 +149,7 @@ def evaluate(
             return song_request(song, None if store is None else store.performance(song))
 
         if only_here:
-            playing = _in_this_process(waiting, casting, seconds, request)
+            playing = _in_this_process(waiting, casting, seconds, lead_in, request)
         else:
             setup = {
                 "player": str(player),
@@ -152,6 +157,7 @@ def evaluate(
                 "seed": seed,
                 "settings": chosen,
                 "seconds": seconds,
+                "lead_in": lead_in,
             }
             playing = work(SONG_WORKER, waiting, jobs or cores(), setup, request)
         with closing(playing) as played:
@@ -171,6 +177,7 @@ def evaluate(
             "seed": None if isinstance(player, Player) else seed,
             "settings": chosen,
             "seconds": seconds if math.isfinite(seconds) else None,
+            "lead_in": float(lead_in),
             "songs": listed,
             "mean": means.value,
             "measured": means.songs,
@@ -202,11 +209,13 @@ def _in_this_process(
     songs: list[Path],
     casting: Casting,
     seconds: float,
+    lead_in: float,
     request: Callable[[Path], dict[str, str]],
 ) -> Generator[tuple[Path, Row], None, None]:
     """Songs with their rows, for a player that exists in this process alone."""
     for song in songs:
-        yield song, answered(lambda asked: play_song(casting, asked, seconds), request(song))
+        row = answered(lambda asked: play_song(casting, asked, seconds, lead_in), request(song))
+        yield song, row
 
 
 def read_row(path: Path) -> Row:

@@ -20,13 +20,13 @@ def load_song_worker(setup: dict[str, Any]) -> Callable[[dict[str, str]], dict[s
 
     Args:
         setup: `player`, `effort`, `seed` and `settings`, what `load_player` takes; `seconds`, how
-            much of a song to play at most [s].
+            much of a song to play at most, and `lead_in`, the silence before it [s].
 
     Returns:
         What plays the song of a `song_request` and gives its row, as `play_song` does.
     """
     casting = Casting.of(setup["player"], setup["effort"], setup["seed"], **setup["settings"])
-    return lambda request: play_song(casting, request, setup["seconds"])
+    return lambda request: play_song(casting, request, setup["seconds"], setup["lead_in"])
 
 
 def song_request(song: Path, performance: Path | None) -> dict[str, str]:
@@ -40,13 +40,16 @@ def song_request(song: Path, performance: Path | None) -> dict[str, str]:
     return {"song": str(song), **kept}
 
 
-def play_song(casting: Casting, request: dict[str, str], seconds: float) -> dict[str, Any]:
+def play_song(
+    casting: Casting, request: dict[str, str], seconds: float, lead_in: float
+) -> dict[str, Any]:
     """Play a song and score it.
 
     Args:
         casting: who plays.
         request: a `song_request`.
         seconds: how much of it to play at most [s]; a player of one excerpt plays that.
+        lead_in: silence before the first sound [s].
 
     Returns:
         The row: the summary, with the name of the file as its `song`, and `causes`, the frames that
@@ -57,7 +60,7 @@ def play_song(casting: Casting, request: dict[str, str], seconds: float) -> dict
         OSError: the performance cannot be written.
     """
     song = Path(request["song"])
-    player, score = casting.cast(song, 0.0, seconds)
+    player, score = casting.cast(song, 0.0, seconds, lead_in)
     performance = player.play(score)
     if "performance" in request:
         performance.save(request["performance"])

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from pianomime.errors import InputError
-from pianomime.music import Score, excerpt
-from pianomime.plan.demonstration import Demonstration
+from pianomime.music import Score
+from pianomime.music.excerpt import check_lead_in, excerpt
+from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.players.builtin import DemonstrationNeededError
 from pianomime.players.performance import is_performance
-from pianomime.players.player import Player
+from pianomime.players.player import PlannedPlayer, Player
 from pianomime.players.registry import load_player
 from pianomime.shown import command_word
 
@@ -61,19 +62,50 @@ class Casting:
         """Whether the player plays files of this kind."""
         return self.player is not None or path.suffix == _SUFFIX
 
-    def cast(self, path: Path, start: float, seconds: float) -> tuple[Player, Score]:
+    @property
+    def takes_lead_in(self) -> bool:
+        """Whether the player can begin with silence: no expert can, and no demonstration's plan."""
+        player = self.player
+        if player is None or player.excerpt is not None:
+            return False
+        return not (
+            isinstance(player, PlannedPlayer) and isinstance(player.planner, DemonstrationPlanner)
+        )
+
+    def check_lead_in(self, lead_in: float) -> None:
+        """Refuse what is no lead-in, or is none for this player.
+
+        Args:
+            lead_in: silence before the first sound [s].
+
+        Raises:
+            InputError: it is out of range, or the player takes none.
+        """
+        check_lead_in(lead_in)
+        if lead_in and not self.takes_lead_in:
+            name = self.source.name if isinstance(self.source, Player) else self.source
+            raise InputError(
+                f"lead-in {lead_in:g}: {name} plays music of its own, from the first note on; "
+                f"its lead-in is 0"
+            )
+
+    def cast(
+        self, path: Path, start: float, seconds: float, lead_in: float
+    ) -> tuple[Player, Score]:
         """Who plays a file, and what.
 
         Args:
             path: a MIDI file or a demonstration.
             start: where to begin: with the first sound at or after it [s].
             seconds: how much of it at most [s]. A player of one excerpt plays that instead.
+            lead_in: silence before the first sound [s].
 
         Raises:
             OSError: the file cannot be read.
-            InputError: it is of another kind, or damaged; nothing sounds in that part of it; or the
-                player needs a demonstration.
+            InputError: it is of another kind, or damaged; nothing sounds in that part of it; the
+                player needs a demonstration, or takes no lead-in.
         """
+        self.check_lead_in(lead_in)
         if self.player is not None and self.player.excerpt is not None:
             start, seconds = self.player.excerpt
         if not self.can_play(path):
@@ -82,7 +114,7 @@ class Casting:
             )
         if path.suffix != _SUFFIX:
             assert self.player is not None
-            return self.player, excerpt(Score.from_midi(path), start, seconds)
+            return self.player, excerpt(Score.from_midi(path), start, seconds, lead_in)
         if is_performance(path):
             raise InputError(
                 f"{path}: is a performance, which was played already; see and hear it with "
@@ -90,7 +122,7 @@ class Casting:
             )
         shown = Demonstration.load(path).excerpt(start, seconds)
         if self.player is not None:
-            return self.player, shown.score
+            return self.player, shown.score.delay(lead_in)
         made = load_player(
             self.source, self.effort, self.seed, demonstration=shown, **self.settings
         )
