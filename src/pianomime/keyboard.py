@@ -24,8 +24,8 @@ EXCERPT_SECONDS = 30.0
 """[s] Default length of an excerpt: the longest clip of the paper's protocol."""
 
 LEAD_IN_SECONDS = 0.5
-"""[s] Default silence before the first sound of what `pianomime play` plays, our choice: the paper's
-protocol has none. RoboPianist's tasks call it `initial_buffer_time`, which is 0 by default."""
+"""[s] Default silence before the first sound of what `pianomime play` plays: our choice, for the
+paper's protocol has none. RoboPianist's tasks call it `initial_buffer_time`, 0 by default."""
 
 NO_KEY = -1
 """Marks the absence of a key in arrays of keys."""
