@@ -8,7 +8,8 @@ from typing import Annotated
 import tyro
 
 _ABOUT = {
-    "zero-shot": "plans fingers, paths and forces",
+    "zero-shot": "plans, rehearses, plays with touch",
+    "zero-shot-20hz": "plans frames, as in the paper",
     "zero-shot-ik": "the same, the paper's tracker",
     "fingers": "zero-shot, a learned residual",
     "two-stage-diff": "diffusion policies, two levels",

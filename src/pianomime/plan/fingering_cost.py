@@ -91,18 +91,15 @@ class FingeringConfig:
         """Costs where notes count.
 
         An ear misses a note that is not struck, be it short or long, in a full chord or alone, and
-        outer voices first; it hardly hears a long note end early, less so under the pedal.
+        outer voices first; it hardly hears a long note end early.
         """
         return cls(
             beam=200,
             by_note=True,
             melody=2.5,
             bass=2.5,
-            frame=0.4,
-            pedalled=0.6,
-            most_frames=2.0,
+            most_frames=6.0,
             late=4.0,
-            early=5,
             travel_speed=0.35,
         )
 

@@ -6,12 +6,16 @@ A planner makes it from a Score; a tracker turns it into controls.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.short_repr import count, short_repr
+
+if TYPE_CHECKING:
+    from pianomime.plan.strikes import Strikes
 
 LEFT, RIGHT = 0, 1
 """Index of a hand in every plan array: keyboard order, bass side first."""
@@ -36,6 +40,8 @@ class FingertipPlan:
         finger_key: (T, 2, 5) int8; key 0..87 that each finger presses, -1 (`NO_KEY`) for none.
         note_hand: (N,) int8; hand of each note of the score: 0 left, 1 right, -1 not played.
         note_finger: (N,) int8; finger of each note: 0 thumb .. 4 little, -1 not played.
+        strikes: when keys are to sound and how loud, between frames; None for plans of frames
+            alone, such as a human's. Files do not hold them.
 
     Raises:
         ValueError: shapes do not match, or `fingertips` is not finite.
@@ -45,6 +51,7 @@ class FingertipPlan:
     finger_key: NDArray[np.int8]
     note_hand: NDArray[np.int8]
     note_finger: NDArray[np.int8]
+    strikes: Strikes | None = None
 
     def __post_init__(self) -> None:
         frames = len(self.fingertips)

@@ -81,4 +81,9 @@ def plan_of(arrays: Mapping[str, NDArray[Any]]) -> FingertipPlan:
     Raises:
         ValueError: they do not fit together.
     """
-    return FingertipPlan(**{name.removeprefix("plan_"): arrays[name] for name in PLAN_SCHEMA})
+    return FingertipPlan(
+        fingertips=arrays["plan_fingertips"],
+        finger_key=arrays["plan_finger_key"],
+        note_hand=arrays["plan_note_hand"],
+        note_finger=arrays["plan_note_finger"],
+    )

@@ -13,6 +13,7 @@ from pianomime.plan.fingering import Fingering, find_fingering
 from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.plan.fingertip_plan import FingertipPlan
 from pianomime.plan.hand_path import HandPathConfig, hand_paths
+from pianomime.plan.strikes import strikes_of
 from pianomime.world.layout import FINGER_COUNT
 
 
@@ -37,7 +38,8 @@ class ZeroShotPlanner:
         fingering = find_fingering(score, self.config.fingering)
         finger_key = finger_keys(score, fingering)
         fingertips = hand_paths(finger_key, self.config.path)
-        return FingertipPlan(fingertips, finger_key, fingering.hand, fingering.finger)
+        strikes = strikes_of(score, fingering)
+        return FingertipPlan(fingertips, finger_key, fingering.hand, fingering.finger, strikes)
 
 
 def finger_keys(score: Score, fingering: Fingering) -> NDArray[np.int8]:

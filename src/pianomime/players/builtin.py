@@ -9,6 +9,7 @@ from typing import Any
 from pianomime.errors import InputError
 from pianomime.plan import ZeroShotConfig, ZeroShotPlanner
 from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
+from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.players.generalist import GeneralistPlayer
 from pianomime.players.player import PlannedPlayer, Player
 from pianomime.players.settings import PlayerFactory, configure
@@ -26,10 +27,20 @@ from pianomime.track import (
     DynamicTracker,
     IkConfig,
     IkTracker,
+    KeystrokeConfig,
+    KeystrokeTracker,
+    NoteSamplingConfig,
+    NoteSamplingTracker,
     PredictiveSamplingConfig,
     PredictiveSamplingTracker,
+    RehearsalConfig,
+    RehearsedTracker,
     Tracker,
 )
+
+ZERO_SHOT_20HZ = "zero-shot-20hz"
+"""The zero-shot player of frames, in the paper's protocol: one control a frame, notes begin and end
+with frames, and frames are what counts. Learners build on it."""
 
 
 class DemonstrationNeededError(InputError):
@@ -45,6 +56,22 @@ def _budget(effort: int, seed: int) -> PredictiveSamplingConfig:
 
 
 def _zero_shot(effort: int, seed: int, **settings: Any) -> Player:
+    planner, tracker, rehearsal, sampling = configure(
+        settings,
+        planner=ZeroShotConfig(fingering=FingeringConfig.notes()),
+        tracker=KeystrokeConfig(),
+        rehearsal=RehearsalConfig(),
+        sampling=replace(NoteSamplingConfig.of_effort(effort or 1), seed=seed),
+    )
+    controls: Tracker = KeystrokeTracker(tracker)
+    if effort:
+        rehearsed = RehearsedTracker(KeystrokeTracker(tracker), rehearsal)
+        controls = NoteSamplingTracker(rehearsed, sampling)
+    touch = tracker.stroke.touch
+    return PlannedPlayer("zero-shot", ZeroShotPlanner(planner), controls, effort, touch=touch)
+
+
+def _zero_shot_20hz(effort: int, seed: int, **settings: Any) -> Player:
     planner, tracker, sampling = configure(
         settings,
         planner=ZeroShotConfig(),
@@ -52,7 +79,7 @@ def _zero_shot(effort: int, seed: int, **settings: Any) -> Player:
         sampling=_budget(effort, seed),
     )
     controls = _with_sampling(DynamicTracker(tracker), effort, sampling)
-    return PlannedPlayer("zero-shot", ZeroShotPlanner(planner), controls, effort)
+    return PlannedPlayer(ZERO_SHOT_20HZ, ZeroShotPlanner(planner), controls, effort)
 
 
 def _zero_shot_ik(effort: int, seed: int, **settings: Any) -> Player:
@@ -107,6 +134,7 @@ def _generalist(method: str) -> PlayerFactory:
 
 FACTORIES: dict[str, PlayerFactory] = {
     "zero-shot": _zero_shot,
+    ZERO_SHOT_20HZ: _zero_shot_20hz,
     "zero-shot-ik": _zero_shot_ik,
     FINGERS: _fingers,
     **{method: _generalist(method) for method in GENERALISTS},
@@ -117,7 +145,13 @@ FACTORIES: dict[str, PlayerFactory] = {
 
 _SAMPLING = {"sampling": PredictiveSamplingConfig.of_effort(1)}
 SETTINGS: dict[str, dict[str, Any]] = {
-    "zero-shot": {"planner": ZeroShotConfig(), "tracker": DynamicConfig(), **_SAMPLING},
+    "zero-shot": {
+        "planner": ZeroShotConfig(fingering=FingeringConfig.notes()),
+        "tracker": KeystrokeConfig(),
+        "rehearsal": RehearsalConfig(),
+        "sampling": NoteSamplingConfig.of_effort(1),
+    },
+    ZERO_SHOT_20HZ: {"planner": ZeroShotConfig(), "tracker": DynamicConfig(), **_SAMPLING},
     "zero-shot-ik": {"planner": ZeroShotConfig(), "tracker": IkConfig()},
     FINGERS: {"planner": ZeroShotConfig(), **_SAMPLING},
     **{method: {"sampler": SAMPLERS[1]} for method in GENERALISTS},

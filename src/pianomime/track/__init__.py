@@ -3,7 +3,10 @@
 from pianomime.track.controller import BatchController, Controller, PedalController
 from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
+from pianomime.track.keystroke import KeystrokeConfig, KeystrokeTracker
+from pianomime.track.note_sampling import NoteSamplingConfig, NoteSamplingTracker
 from pianomime.track.predictive_sampling import PredictiveSamplingConfig, PredictiveSamplingTracker
+from pianomime.track.rehearsal import RehearsalConfig, RehearsedTracker
 from pianomime.track.replay import ReplayTracker
 from pianomime.track.tracker import BatchTracker, Tracker
 
@@ -15,9 +18,15 @@ __all__ = [
     "DynamicTracker",
     "IkConfig",
     "IkTracker",
+    "KeystrokeConfig",
+    "KeystrokeTracker",
+    "NoteSamplingConfig",
+    "NoteSamplingTracker",
     "PedalController",
     "PredictiveSamplingConfig",
     "PredictiveSamplingTracker",
+    "RehearsalConfig",
+    "RehearsedTracker",
     "ReplayTracker",
     "Tracker",
 ]

@@ -22,15 +22,13 @@ from pianomime.plan.joint_path import (
     smooth_path,
 )
 from pianomime.progress import Steps
+from pianomime.track.finger_feedback import lift_joints, reach_joints, shared
 from pianomime.validation import finite
 from pianomime.world import World
 from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
-
-_LIFT_DAMPING = 0.01
-"""[m/rad] Damping of the lift: joints that raise a fingertip by less hardly move."""
 
 _WINDOW = 1000
 """Frames whose torques are in memory for every finger."""
@@ -171,32 +169,14 @@ class DynamicController:
             low = tips[:, 2] < resting_height(tips[:, 0]) - self.config.sunk
             lift = np.where(keys >= 0, beside, low)
             move = self.config.joint_feedback * (self._paths[index][frame] - here)
-            move += self._reach(jacobian, error)
             limit = self.config.tip_error
-            move[LAYOUT.slide] += _shared(np.clip(error[keys >= 0, 1], -limit, limit))
-            move += self._lift(jacobian[lift, 2])
+            reach = reach_joints(jacobian, error, limit, self.config.tip_damping)
+            move += self.config.tip_feedback * reach
+            move[LAYOUT.slide] += shared(np.clip(error[keys >= 0, 1], -limit, limit))
+            move += lift_joints(jacobian[lift, 2], self.config.depth + self.config.clear)
             press = self._press[index].of(frame, ~lift)
             ctrl[hand.actuators] += hand.to_ctrl @ move + press
         return ctrl, points
-
-    def _reach(
-        self, jacobian: NDArray[np.float64], error: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """(27,) joint displacement that reduces the errors (5, 3) of the fingertips [m]."""
-        size = np.linalg.norm(error, axis=1, keepdims=True)
-        error = error * np.minimum(1.0, self.config.tip_error / np.maximum(size, 1e-9))
-        gram = jacobian @ jacobian.transpose(0, 2, 1) + self.config.tip_damping**2 * np.eye(3)
-        force = np.linalg.solve(gram, error[..., None])
-        move: NDArray[np.float64] = (jacobian.transpose(0, 2, 1) @ force).sum(axis=0)[:, 0]
-        move *= self.config.tip_feedback
-        return move
-
-    def _lift(self, upward: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(27,) joint displacement that lifts F fingers; their vertical Jacobian is (F, 27)."""
-        height = self.config.depth + self.config.clear
-        strength = (upward**2).sum(axis=1, keepdims=True) + _LIFT_DAMPING**2
-        lift: NDArray[np.float64] = (height * upward / strength).sum(axis=0)
-        return lift
 
     def _targets(
         self, points: NDArray[np.float64], finger_key: NDArray[np.int8]
@@ -246,24 +226,18 @@ class _Press:
         return chosen
 
 
-def _shared(error: NDArray[np.float64]) -> float:
-    """The part of the errors of F pressing fingers that the forearm corrects [m].
-
-    Stretched fingers are at the end of what their joints can do: only the forearm can help them,
-    all alike. Of the error of a single finger it corrects half.
-    """
-    return float(error.sum()) / (len(error) + 1)
-
-
-def motion_torque(hand: Hand, path: NDArray[np.float64]) -> NDArray[np.float64]:
+def motion_torque(
+    hand: Hand, path: NDArray[np.float64], dt: float = FRAME_SECONDS
+) -> NDArray[np.float64]:
     """(T, 27) [N m, N] torque that moves a hand along a path (T + 1, 27), without contacts.
 
-    For each control step: at its middle, with the accelerations of its two ends averaged.
+    For each control step, of `dt` [s]: at its middle, with the accelerations of its two ends
+    averaged.
     """
     middle = (path[1:] + path[:-1]) / 2
-    velocity = np.diff(path, axis=0) / FRAME_SECONDS
+    velocity = np.diff(path, axis=0) / dt
     padded = np.vstack([np.zeros_like(velocity[:1]), velocity, velocity[-1:]])
-    acceleration = (padded[2:] - padded[:-2]) / (2 * FRAME_SECONDS)
+    acceleration = (padded[2:] - padded[:-2]) / (2 * dt)
     torque = np.empty_like(middle)
     data = mujoco.MjData(hand.model)
     for step in range(len(middle)):

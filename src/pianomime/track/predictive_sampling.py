@@ -17,48 +17,26 @@ from pianomime.errors import InputError
 from pianomime.plan import FingertipPlan
 from pianomime.track.controller import Controller
 from pianomime.track.tracker import Tracker
-from pianomime.validation import finite, whole_numbers
+from pianomime.track.variations import VariationConfig, Variations
+from pianomime.validation import within
 from pianomime.world import World, WorldBatch
-from pianomime.world.hand import by_actuator
-from pianomime.world.layout import LAYOUT
-from pianomime.world.parameters import key_centres
 
 
 @dataclass(frozen=True)
-class PredictiveSamplingConfig:
+class PredictiveSamplingConfig(VariationConfig):
     """The sampling budget, and the distribution of the variations."""
 
-    variations: int = 16
-    """Variations that are rolled out side by side."""
     rounds: int = 2
     """Rounds of variations, each around the best so far: rounds gain more than variations do."""
     commit: int = 4
     """Frames that are played before looking ahead again."""
     ahead: int = 8
     """Frames that are looked ahead."""
-    knots: int = 4
-    """Frames between the knots of a variation, which is linear between them."""
-    joint: float = 0.2
-    """Standard deviation of variations of the fingers' actuators [rad]."""
-    wrist: float = 0.06
-    """Standard deviation of variations of the wrists' actuators [rad]."""
-    slide: float = 0.006
-    """Standard deviation of variations of the forearms' slides [m]."""
-    blamed: float = 0.7
-    """Probability that an actuator of a finger that goes wrong is varied."""
-    arm: float = 0.3
-    """Probability that an actuator of its wrist and forearm is varied."""
-    others: float = 0.1
-    """Probability that an actuator of another finger of its hand is varied."""
-    seed: int = 0
-    """Seed of the variations."""
 
     def __post_init__(self) -> None:
-        whole_numbers(self)
-        finite(self)
-        for name in ("variations", "rounds", "commit", "ahead", "knots"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} must be 1 or more, not {getattr(self, name)}")
+        super().__post_init__()
+        for name in ("rounds", "commit", "ahead"):
+            within(name, getattr(self, name), 1)
 
     @classmethod
     def of_effort(cls, effort: int) -> PredictiveSamplingConfig:
@@ -140,10 +118,8 @@ class PredictiveSamplingController:
         self.plan = base.plan
         self.steps = 0
         self._base, self._goal = base, goal
-        self._spread = by_actuator(config.joint, config.wrist, config.slide)
         self._batch = WorldBatch(config.variations, threads, quiet=True)
-        self._along = self.plan.fingertips[:, :, 1:, 1]
-        self._rng = np.random.default_rng(config.seed)
+        self._variations = Variations(self.plan, config)
         self._ctrl: list[NDArray[np.float64]] = []
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
@@ -167,9 +143,9 @@ class PredictiveSamplingController:
         if not wrong[: self.config.commit + 2].any():
             return ctrl
         state = world.state()
-        probability = self._probabilities(frame, wrong)
+        probability = self._variations.probabilities(frame, np.argwhere(wrong))
         for _ in range(self.config.rounds):
-            tries = ctrl + self._variations(len(goal), probability)
+            tries = ctrl + self._variations.draw(len(goal), probability)
             tries[0] = ctrl
             cost = self._cost(state, tries, goal)
             ctrl = tries[int(np.argmin(cost))]
@@ -192,34 +168,3 @@ class PredictiveSamplingController:
             short = np.abs(self._batch.key_state - goal[step])
             cost += wrong.sum(axis=1) + 0.1 * short.sum(axis=1)
         return cost + 100.0 * self._batch.blow_ups
-
-    def _probabilities(self, frame: int, wrong: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(46,) probability that each actuator is varied, given the keys (H, 88) that go wrong.
-
-        Mostly those of the fingers that miss a key or are nearest to one that is hit.
-        """
-        probability = np.zeros(LAYOUT.ctrl_size)
-        arm = LAYOUT.arm_actuators
-        for step, key in np.argwhere(wrong):
-            fingers = np.argwhere(self.plan.finger_key[frame + step] == key)
-            if not len(fingers):
-                away = np.abs(self._along[frame + step] - key_centres()[key, 1])
-                fingers = np.argwhere(away == away.min())
-            for index, finger in fingers:
-                mine = probability[LAYOUT.actuators[index]]
-                np.maximum(mine, self.config.others, out=mine)
-                mine[arm] = np.maximum(mine[arm], self.config.arm)
-                mine[LAYOUT.finger_actuators[finger]] = self.config.blamed
-        return probability
-
-    def _variations(self, frames: int, probability: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(B, frames, 46) smooth random additions to the controls."""
-        knots = np.arange(0, frames + self.config.knots, self.config.knots)
-        size = self.config.variations, len(knots), LAYOUT.ctrl_size
-        drawn = self._rng.standard_normal(size) * self._spread
-        drawn *= self._rng.random((size[0], 1, size[2])) < probability
-        at = np.arange(frames)
-        low = at // self.config.knots
-        share = ((at % self.config.knots) / self.config.knots)[:, None]
-        smooth: NDArray[np.float64] = drawn[:, low] * (1 - share) + drawn[:, low + 1] * share
-        return smooth

@@ -1,0 +1,288 @@
+"""The keystroke tracker: hands follow a path over the keys, and fingers strike at their own times.
+
+As the dynamic tracker does, it sends the joint positions whose springs give the torques that the
+wanted motion needs. But it sends several controls a frame, looks at the hands before each, and
+moves every finger by the strokes of its strikes: when a note begins within a frame, and how loud it
+is, is up to the score.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.keyboard import FRAME_SECONDS
+from pianomime.plan import FingertipPlan
+from pianomime.plan.joint_path import KEY_REST, PathConfig, resting_height, smooth_path
+from pianomime.plan.strikes import Strikes
+from pianomime.progress import Steps
+from pianomime.track.dynamic import motion_torque, to_actuators
+from pianomime.track.finger_feedback import lift_joints, reach_joints, shared
+from pianomime.track.strokes import Corrections, StrokeConfig, strokes_of
+from pianomime.validation import finite, whole_numbers, within
+from pianomime.world import World
+from pianomime.world.hand import Hand
+from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
+from pianomime.world.model import SIDES
+from pianomime.world.parameters import SUBSTEPS, key_centres, key_half_sizes
+
+# Errors of the path at which their cost is 1 [m].
+_WRIST_TOLERANCE = 0.05  # along the keyboard; the others do not count
+_HOVER_TOLERANCE = 0.004
+_PRESS_TOLERANCE = np.array([0.004, 0.0015, 0.001])  # along x, y, z
+
+
+@dataclass(frozen=True)
+class KeystrokeConfig:
+    """Settings of the keystroke tracker."""
+
+    controls: int = 5
+    """Controls a frame; a frame has 10 physics steps, which they must divide."""
+    stroke: StrokeConfig = field(default_factory=StrokeConfig)
+    """How keys are struck."""
+    path: PathConfig = field(default_factory=PathConfig)
+    """Weights of the path of the hands."""
+    refine: int = 3
+    """Gauss-Newton steps of the path with all controls, after one with frames alone."""
+    again: int = 2
+    """Gauss-Newton steps of the path when its strokes were corrected."""
+    joint_feedback: float = 0.3
+    """Gain of the joint-position feedback of wrists and fingers."""
+    slide_feedback: float = 0.8
+    """Gain of the joint-position feedback of the forearms' slides."""
+    tip_feedback: float = 0.5
+    """Gain of the fingertip-position feedback on the finger's own joints."""
+    tip_damping: float = 0.03
+    """Damping of the fingertip-position feedback [m/rad]."""
+    tip_error: float = 0.02
+    """Fingertip errors are clipped to this length [m]."""
+    astray: float = 0.009
+    """A finger further than this beside its key does not press, but is lifted [m]."""
+    sunk: float = 0.005
+    """An idle fingertip further than this below the tops of the keys is lifted [m]."""
+    clear: float = 0.024
+    """Height by which such fingers are lifted [m]."""
+
+    def __post_init__(self) -> None:
+        whole_numbers(self)
+        finite(self)
+        within("controls", self.controls, 1, SUBSTEPS)
+        if SUBSTEPS % self.controls:
+            raise InputError(f"controls must divide {SUBSTEPS}, not be {self.controls}")
+
+
+class KeystrokeTracker:
+    """Follows plans that have strikes.
+
+    Args:
+        config: its settings; those of the zero-shot player if None.
+    """
+
+    def __init__(self, config: KeystrokeConfig | None = None) -> None:
+        self.config = config or KeystrokeConfig()
+        self._hands = [Hand(side) for side in SIDES]
+
+    def start(self, plan: FingertipPlan) -> KeystrokeController:
+        """A controller with paths and the feed-forward controls that follow them.
+
+        Raises:
+            InputError: the plan has no strikes.
+        """
+        if plan.strikes is None:
+            raise InputError("this plan has no strikes: it says nothing of notes between frames")
+        return KeystrokeController(plan, plan.strikes, self.config, self._hands)
+
+
+class KeystrokeController:
+    """Feed-forward controls of one plan, and feedback of the present errors.
+
+    Attributes:
+        plan: what is followed.
+        strikes: of the plan.
+        config: settings.
+        corrections: of the strikes, as they were given last.
+        speeds: (M,) speed of each key's front edge at which it is to sound [m/s].
+
+    Args:
+        plan: what is followed.
+        strikes: of the plan.
+        config: settings.
+        hands: (left, right), for kinematics; their pose is not preserved.
+    """
+
+    replayable = True
+
+    def __init__(
+        self, plan: FingertipPlan, strikes: Strikes, config: KeystrokeConfig, hands: list[Hand]
+    ) -> None:
+        self.plan, self.strikes, self.config = plan, strikes, config
+        self.speeds = config.stroke.speeds(strikes)
+        self._hands = hands
+        ends = np.arange(1, len(plan) * config.controls + 1, dtype=np.float64)
+        self._times = ends * self._dt
+        self._gain = np.full(LAYOUT.hand_joints, config.joint_feedback)
+        self._gain[LAYOUT.slides] = config.slide_feedback
+        frame = np.floor(strikes.onset / FRAME_SECONDS).astype(int).clip(0, len(plan) - 1)
+        self._x = plan.fingertips[frame, strikes.hand, 1 + strikes.finger, 0]
+        hinge = key_centres()[strikes.key, 0] - key_half_sizes()[strikes.key, 0]
+        self._reach = self._x - hinge
+        self._paths = [self._coarse_path(index) for index in range(len(hands))]
+        self.correct(Corrections.none(len(strikes)), config.refine)
+
+    @property
+    def controls_per_frame(self) -> int:
+        """Number of controls that follow one another in a frame."""
+        return self.config.controls
+
+    def correct(self, corrections: Corrections, iterations: int | None = None) -> None:
+        """Aim at other times and speeds.
+
+        Args:
+            corrections: of the strikes.
+            iterations: Gauss-Newton steps of the paths; `again` of the settings if None.
+        """
+        self.corrections = corrections
+        iterations = self.config.again if iterations is None else iterations
+        self._strokes = strokes_of(
+            self.strikes, corrections, self._reach, self._times, self.config.stroke
+        )
+        count = len(self._times)
+        self._feedforward = np.empty((count, LAYOUT.ctrl_size))
+        self._press = np.zeros((count, 2, FINGER_COUNT, LAYOUT.hand_actuators))
+        self._tips = np.empty((2, count + 1, FINGER_COUNT, 3))
+        config = replace(self.config.path, iterations=iterations)
+        steps = Steps("controls", len(SIDES) * (iterations + 2) * count)
+        # An idle finger counts for the time for which it is idle, a stroke for each of its points.
+        share = 1.0 / np.sqrt(self.config.controls)
+        for index, hand in enumerate(self._hands):
+            targets, weights = self._targets(index)
+            weights *= share
+            weights[:, 1:][self._strokes.tight[:, index]] /= share
+            path = smooth_path(
+                hand,
+                np.zeros(LAYOUT.hand_joints),
+                targets,
+                weights,
+                np.full((count, FINGER_COUNT), np.nan),
+                config,
+                steps.advance,
+                self._dt,
+                self._paths[index][1:],
+            )
+            self._paths[index] = path
+            self._follow(index, hand, path)
+            steps.advance(count)
+            torque = to_actuators(hand, motion_torque(hand, path, self._dt)) / hand.gain
+            self._feedforward[:, hand.actuators] = (path[1:] + path[:-1]) / 2 @ hand.to_ctrl.T
+            self._feedforward[:, hand.actuators] += torque
+            steps.advance(count)
+
+    def control(self, frame: int, world: World) -> NDArray[np.float64]:
+        """(46,) right then left: feed-forward, and a share of the present errors.
+
+        A finger that is not over its key would press another one or be caught by it: it is lifted
+        above the keys until it is over its key. So is an idle finger that has sunk between keys.
+
+        Args:
+            frame: number of the control, of which a frame has `controls_per_frame`.
+            world: as it is before it.
+        """
+        config, qpos = self.config, world.qpos
+        ctrl: NDArray[np.float64] = self._feedforward[frame].copy()
+        for index, hand in enumerate(self._hands):
+            here = qpos[hand.joints]
+            points, jacobian = hand.points_and_jacobian(here)
+            tips, jacobian = points[1:], jacobian[1:]
+            # A finger corrects itself, and only what striking fingers have in common is left to the
+            # forearm: moving it moves all of them.
+            jacobian[..., : LAYOUT.arm_joints] = 0.0
+            error = self._tips[index, frame] - tips
+            strike = self._strokes.strike[frame, index]
+            strikes = strike >= 0
+            arrives = self._tips[index, frame + 1, :, 1] - error[:, 1]
+            away = np.abs(arrives[strikes] - key_centres()[self.strikes.key[strike[strikes]], 1])
+            lift = tips[:, 2] < resting_height(tips[:, 0]) - config.sunk
+            lift[strikes] = away > config.astray
+            move = self._gain * (self._paths[index][frame] - here)
+            reach = reach_joints(jacobian, error, config.tip_error, config.tip_damping)
+            move += config.tip_feedback * reach
+            along = error[strikes, 1].clip(-config.tip_error, config.tip_error)
+            move[LAYOUT.slide] += shared(along)
+            move += lift_joints(jacobian[lift, 2], config.clear)
+            press = self._press[frame, index][strikes & ~lift].sum(axis=0)
+            ctrl[hand.actuators] += hand.to_ctrl @ move + press
+        return ctrl
+
+    @property
+    def _dt(self) -> float:
+        """[s] Length of a control."""
+        return FRAME_SECONDS / self.config.controls
+
+    def _coarse_path(self, index: int) -> NDArray[np.float64]:
+        """(n + 1, 27) The path to begin with: one of frames, straight between them."""
+        hand, frames = self._hands[index], len(self.plan)
+        self._strokes = strokes_of(
+            self.strikes,
+            Corrections.none(len(self.strikes)),
+            self._reach,
+            self._times,
+            self.config.stroke,
+        )
+        targets, weights = self._targets(index)
+        ends = slice(self.config.controls - 1, None, self.config.controls)
+        steps = Steps("paths", self.config.path.iterations * frames)
+        path = smooth_path(
+            hand,
+            np.zeros(LAYOUT.hand_joints),
+            targets[ends],
+            weights[ends],
+            np.full((frames, FINGER_COUNT), np.nan),
+            self.config.path,
+            steps.advance,
+        )
+        at = np.arange(frames + 1) * FRAME_SECONDS
+        fine = [np.interp(np.append(0.0, self._times), at, joint) for joint in path.T]
+        return np.stack(fine, axis=1)
+
+    def _targets(self, index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Targets and weights (n, 6, 3) of one hand, as `smooth_path` takes them."""
+        ends = np.arange(1, len(self.plan) + 1) * FRAME_SECONDS
+        points = self.plan.fingertips[:, index]
+        pressing = self.plan.finger_key[:, index] >= 0
+        targets = np.empty((len(self._times), POINT_COUNT, 3))
+        for point, axis in np.ndindex(POINT_COUNT, 3):
+            # The height of a finger that presses says nothing of where it hovers.
+            known = ~pressing[:, point - 1] if point and axis == 2 else np.ones(len(ends), bool)
+            if not known.any():
+                known[:] = True
+            targets[:, point, axis] = np.interp(
+                self._times, ends[known], points[known, point, axis]
+            )
+        weights = np.zeros_like(targets)
+        weights[:, 0, 1] = 1 / _WRIST_TOLERANCE
+        weights[:, 1:] = 1 / _HOVER_TOLERANCE
+        strike = self._strokes.strike[:, index]
+        busy = strike >= 0
+        key = self.strikes.key[strike[busy]]
+        targets[:, 1:, 0][busy] = self._x[strike[busy]]
+        targets[:, 1:, 1][busy] = key_centres()[key, 1]
+        targets[:, 1:, 2][busy] = KEY_REST[key] + self._strokes.height[:, index][busy]
+        weights[:, 1:][busy] = 1 / _PRESS_TOLERANCE
+        return targets, weights
+
+    def _follow(self, index: int, hand: Hand, path: NDArray[np.float64]) -> None:
+        """Note where the fingertips of a path are, and what presses as hard as strokes are."""
+        to_control = np.linalg.pinv(hand.to_ctrl) / hand.gain
+        force = self._strokes.force[:, index]
+        for step, pose in enumerate(path):
+            pushing = np.flatnonzero(force[step - 1]) if step else ()
+            if not len(pushing):
+                self._tips[index, step] = hand.points(pose)[1:]
+                continue
+            points, jacobian = hand.points_and_jacobian(pose)
+            self._tips[index, step] = points[1:]
+            push = -force[step - 1, pushing, None] * jacobian[1:, 2][pushing]
+            self._press[step - 1, index, pushing] = push @ to_control

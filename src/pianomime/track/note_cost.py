@@ -1,0 +1,166 @@
+"""What an ear minds: notes that are missed, that nobody wanted, late or with another touch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.keyboard import FRAME_SECONDS
+from pianomime.plan.strikes import Strikes
+from pianomime.validation import above_zero, finite
+from pianomime.world.key_sensor import KeyEvents
+from pianomime.world.touch import Touch
+
+_OPEN = 0.05
+"""[s] After its onset, until which a strike that did not come may still do so."""
+_AHEAD = 0.03
+"""[s] Strikes so near the end of what is looked at are not missed yet."""
+
+
+@dataclass(frozen=True)
+class NoteCostConfig:
+    """Costs, of which a missed inner note is the unit."""
+
+    outer: float = 1.5
+    """Cost of a note of the melody or the bass that is not struck."""
+    phantom: float = 1.2
+    """Cost of a strike that nobody wanted."""
+    late: float = 0.3
+    """Cost of a strike that is 48 ms early or late; less are in proportion, above 8 ms."""
+    touch: float = 0.15
+    """Cost of a velocity that is 16 steps off; less are in proportion, above 4 steps."""
+    frame: float = 0.1
+    """Cost of a key that is wrong at the end of a frame."""
+    notice: float = 0.15
+    """Costs of time and touch of a strike above which it is wrong."""
+    match: float = 0.12
+    """A strike further than this from the onset is another one [s]."""
+
+    def __post_init__(self) -> None:
+        finite(self)
+        above_zero("match", self.match)
+
+
+class Strike(NamedTuple):
+    """A key that sounded.
+
+    Attributes:
+        key: 0..87.
+        time: from the beginning of the plan [s].
+        speed: of the key's front edge [m/s].
+    """
+
+    key: int
+    time: float
+    speed: float
+
+
+class Frame(NamedTuple):
+    """What was heard in a frame, and which keys (88,) were down at its end."""
+
+    strikes: list[Strike]
+    pressed: NDArray[np.bool_]
+
+
+class NoteCost:
+    """The cost of what is heard, given what was heard before.
+
+    Args:
+        strikes: what should be heard.
+        goal: (T, 88) bool, the keys that should be down at the end of each frame.
+        touch: the map from the speed of a key to velocity.
+        config: costs.
+    """
+
+    def __init__(
+        self, strikes: Strikes, goal: NDArray[np.bool_], touch: Touch, config: NoteCostConfig
+    ) -> None:
+        self._goal, self._touch, self._config = goal, touch, config
+        self._onset: list[float] = strikes.onset.tolist()
+        self._key: list[int] = strikes.key.tolist()
+        self._velocity: list[int] = strikes.velocity.tolist()
+        self._missed = np.where(strikes.outer, config.outer, 1.0).tolist()
+        self._of_key: dict[int, list[int]] = {}
+        for strike, key in enumerate(self._key):
+            self._of_key.setdefault(key, []).append(strike)
+        self._done: set[int] = set()
+
+    def heard(self, strikes: Sequence[Strike]) -> None:
+        """Remember what has sounded for good."""
+        for strike in strikes:
+            wanted = self._wanted(strike, self._done)
+            if wanted is not None:
+                self._done.add(wanted)
+
+    def of(
+        self, first: int, frames: Sequence[Frame], count: int
+    ) -> tuple[float, list[tuple[int, int]]]:
+        """The cost of some frames, and what goes wrong in them.
+
+        Args:
+            first: number of the first frame.
+            frames: what is heard in it and in those that follow.
+            count: of the frames that count; later ones only show what still comes.
+
+        Returns:
+            The cost, and the frames after the first and keys that go wrong, except in frames alone.
+        """
+        config, done = self._config, set(self._done)
+        end = (first + count) * FRAME_SECONDS
+        cost = 0.0
+        wrong: list[tuple[int, int]] = []
+        for step, frame in enumerate(frames):
+            for strike in frame.strikes:
+                wanted = self._wanted(strike, done)
+                if wanted is not None:
+                    done.add(wanted)
+                if step >= count:
+                    continue
+                each = config.phantom if wanted is None else self._off(strike, wanted)
+                cost += each
+                if wanted is None or each > config.notice:
+                    wrong.append((step, strike.key))
+            if step < count:
+                cost += config.frame * float((frame.pressed != self._goal[first + step]).sum())
+        begin, stop = np.searchsorted(self._onset, [first * FRAME_SECONDS - _OPEN, end - _AHEAD])
+        for wanted in range(begin, stop):
+            if wanted not in done:
+                cost += self._missed[wanted]
+                step = int(self._onset[wanted] / FRAME_SECONDS) - first
+                wrong.append((min(max(step, 0), len(frames) - 1), self._key[wanted]))
+        return cost, wrong
+
+    def _wanted(self, strike: Strike, done: set[int]) -> int | None:
+        """The strike that this one is: the nearest of its key that has not come yet."""
+        open_ones = [
+            (abs(self._onset[wanted] - strike.time), wanted)
+            for wanted in self._of_key.get(strike.key, ())
+            if wanted not in done
+        ]
+        apart, wanted = min(open_ones, default=(math.inf, -1))
+        return wanted if apart < self._config.match else None
+
+    def _off(self, strike: Strike, wanted: int) -> float:
+        """The cost of time and touch."""
+        late = max(abs(strike.time - self._onset[wanted]) - 0.008, 0.0) / 0.04
+        velocity = int(self._touch.velocity_of(strike.speed, strike.key))
+        steps = max(abs(velocity - self._velocity[wanted]) - 4, 0) / 12
+        return self._config.late * min(late, 1.5) + self._config.touch * min(steps, 1.5)
+
+
+def strikes_in(events: KeyEvents, begin: float, world: int = 0) -> list[Strike]:
+    """The keys of a world that began to sound.
+
+    Args:
+        events: of one step.
+        begin: when the step began [s].
+        world: index of the world.
+    """
+    on = events.on & (events.world == world)
+    columns = (events.key[on], begin + events.time[on], events.speed[on])
+    return [Strike(*row) for row in zip(*map(np.ndarray.tolist, columns), strict=True)]
