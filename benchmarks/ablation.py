@@ -1,4 +1,4 @@
-"""What each part of the zero-shot player is worth: F1 as it is, minus F1 without the part.
+"""What each part of the zero-shot player of frames is worth: F1 minus F1 without the part.
 
 Costs of the fingering and parts of the dynamic tracker are tried at effort 0, settings of
 predictive sampling at effort 1, on songs of the reference data (PIANOMIME_SHARED). The fingering
@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from common import ROOT, cores, machine, parser, report, shared, show_machine, table
 from pianomime import Performance, Player, Score, evaluate, load_player
+from pianomime.players.builtin import ZERO_SHOT_20HZ
 from pianomime.players.registry import player_settings
 from pianomime.progress import Progress, no_progress
 from pianomime.track import Controller, dynamic, predictive_sampling
@@ -66,14 +67,14 @@ class Part:
     name: str
     without: str
     settings: dict[str, Any]
-    player: str = "zero-shot"
+    player: str = ZERO_SHOT_20HZ
     effort: int = 0
 
 
 def by_settings(name: str, effort: int = 0, **settings: Any) -> Part:
     """A part that settings take out, named "group.field" with "__" for the dot."""
     dotted = {key.replace("__", "."): value for key, value in settings.items()}
-    known = player_settings("zero-shot")
+    known = player_settings(ZERO_SHOT_20HZ)
     changes = [
         f"{key.partition('.')[2]} {known[key]:g} -> {'never' if value == NEVER else f'{value:g}'}"
         for key, value in dotted.items()
@@ -131,27 +132,27 @@ def parts() -> list[Part]:
 
 
 class Ablated(Player):
-    """The zero-shot player, with a name of a module replaced while it plays."""
+    """The zero-shot player of frames, with a name of a module replaced while it plays."""
 
     def __init__(self, effort: int, seed: int, module: Any, name: str, instead: Any) -> None:
-        self.name, self.effort = "zero-shot", effort
-        self._player = load_player("zero-shot", effort, seed)
+        self.name, self.effort = ZERO_SHOT_20HZ, effort
+        self._player = load_player(ZERO_SHOT_20HZ, effort, seed)
         self._replaced = module, name, instead
 
     def start(self, score: Score) -> Controller:
-        """As the zero-shot player, without the part where it matters at the start."""
+        """As that player, without the part where it matters at the start."""
         with patch.object(*self._replaced):
             return self._player.start(score)
 
     def play(self, score: Score, progress: Progress = no_progress) -> Performance:
-        """As the zero-shot player, without the part."""
+        """As that player, without the part."""
         with patch.object(*self._replaced):
             return super().play(score, progress)
 
 
 def without_forearm(effort: int, seed: int) -> Player:
     """The forearm does not correct what pressing fingers miss alike."""
-    return Ablated(effort, seed, dynamic, "_shared", lambda error: 0.0)
+    return Ablated(effort, seed, dynamic, "shared", lambda error: 0.0)
 
 
 def without_feedforward(effort: int, seed: int) -> Player:
@@ -161,7 +162,7 @@ def without_feedforward(effort: int, seed: int) -> Player:
 
 def without_sampling(effort: int, seed: int) -> Player:
     """Predictive sampling does nothing."""
-    return load_player("zero-shot", 0, seed)
+    return load_player(ZERO_SHOT_20HZ, 0, seed)
 
 
 def without_nearly(effort: int, seed: int) -> Player:

@@ -39,11 +39,12 @@ from pianomime import Score, load_player, songs
 from pianomime.files import atomic
 from pianomime.plan import FingertipPlan, Planner
 from pianomime.players import PlannedPlayer
+from pianomime.players.builtin import ZERO_SHOT_20HZ
 from stored_plans import write_plans
 
 STORED = Path(__file__).with_name("digest.json")
 F1_TABLE = ROOT / "tests" / "quality" / "f1.json"
-ZERO_SHOT = "zero-shot"
+ZERO_SHOT = ZERO_SHOT_20HZ
 PLAYERS = (ZERO_SHOT, "zero-shot-ik", "fingers", "two-stage-diff", "two-stage-mse")
 DEMONSTRATION_PLAYERS = ("demonstration", "demonstration-ik")
 REFERENCE = ("etude12", "modern/test12")

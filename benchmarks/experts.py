@@ -6,9 +6,9 @@
 
 `curve` trains the `paper` preset and prints F1 over control steps. `set` trains a preset (`best` if
 none is named) on every song of a folder, one after the other, each for some minutes on all cores,
-and prints for each song its F1 and that of the zero-shot player. `seeds` does that with several
-seeds and prints the spread. All resume when started again: minutes that were used before are
-counted.
+and prints for each song its F1 and that of the zero-shot player of frames. `seeds` does that with
+several seeds and prints the spread. All resume when started again: minutes that were used before
+are counted.
 """
 
 from __future__ import annotations
@@ -61,12 +61,14 @@ def train(song: Path, out: Path, config: ExpertConfig, seconds: float, minutes: 
 
 
 def row(song: Path, out: Path, minutes: float) -> dict[str, Any]:
-    """The F1 of the best expert, and of the zero-shot player on the same excerpt."""
+    """The F1 of the best expert, and of the zero-shot player of frames on the same excerpt."""
     run = ExpertRun.load(out)
     best = run.best()[1]
     zero_shot = out.with_name(out.name + ".zero-shot")
     if not zero_shot.exists():
-        player = replace(load_player("zero-shot"), planner=DemonstrationPlanner(run.demonstration))
+        player = replace(
+            load_player("zero-shot-20hz"), planner=DemonstrationPlanner(run.demonstration)
+        )
         zero_shot.write_text(str(player.play(run.demonstration.score).metrics()["f1"]), "utf-8")
     return {
         "song": song.stem,

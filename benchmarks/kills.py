@@ -231,7 +231,7 @@ class Inputs:
     def _performance(self) -> None:
         from pianomime import load_player
 
-        load_player("zero-shot", 0).play(_score(0)).save(self.folder / "performance.npz")
+        load_player("zero-shot-20hz", 0).play(_score(0)).save(self.folder / "performance.npz")
 
     def _published(self) -> None:
         from pianomime.plan.demonstration import Demonstration

@@ -80,7 +80,7 @@ def play(midi: Path, folder: Path, effort: int, video: bool) -> None:
 
     progress("reading", 0, 0)
     score = excerpt(Score.from_midi(midi), 0.0, float("inf"))
-    player = load_player("zero-shot", effort)
+    player = load_player("zero-shot-20hz", effort)
     row = write_report(player.play(score, progress), folder, video, progress, print_error)
     progress("diagnosis", 0, 0)
     write_diagnosis([Performance.load(folder / "performance.npz")], folder)

@@ -24,6 +24,7 @@ import common
 from pianomime.errors import InputError
 from pianomime.evaluation.evaluation import evaluate
 from pianomime.files import atomic
+from pianomime.players.builtin import ZERO_SHOT_20HZ
 from pianomime.policies.methods import FINGERS, GENERALISTS, WEIGHTS, weight_files
 
 METRICS = ("precision", "recall", "f1")
@@ -293,7 +294,7 @@ def main() -> None:
     methods = [name for name in (*GENERALISTS, FINGERS) if available(name)]
     missing = [name for name in (*GENERALISTS, FINGERS) if name not in methods]
     players = [(method, arguments.effort) for method in methods if method in GENERALISTS]
-    ours = ["zero-shot", *(name for name in methods if name == FINGERS)]
+    ours = [ZERO_SHOT_20HZ, *(name for name in methods if name == FINGERS)]
     players += [(name, effort) for effort in arguments.efforts for name in ours]
     rows = []
     for method, effort in players:

@@ -56,7 +56,7 @@ RENDERED = (
     "petzold-minuet-g",
     "twinkle-twinkle",
 )
-"""Bundled songs, of which the zero-shot player plays 12 s."""
+"""Bundled songs, of which the zero-shot player of frames plays 12 s."""
 
 
 def main() -> None:
@@ -241,7 +241,7 @@ def _rendered(song: str, lit: bool) -> dict[str, Any]:
 @cache
 def _performance(song: str) -> Performance:
     score = excerpt(Score.from_midi(songs.path(song)), seconds=12)
-    return load_player("zero-shot", 0).play(score)
+    return load_player("zero-shot-20hz", 0).play(score)
 
 
 def _moved(score: Score, semitones: int) -> Score | None:

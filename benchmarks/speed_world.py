@@ -117,13 +117,13 @@ def batch_runner(controls: Controls, worlds: int, threads: int) -> tuple[Callabl
 
 
 def song_controls(name: str) -> Controls:
-    """The controls of a zero-shot performance."""
+    """The controls of a zero-shot performance, one a frame."""
     from pianomime.music import Score
     from pianomime.music.excerpt import excerpt
     from pianomime.songs.find import find_song
 
     score = excerpt(Score.from_midi(find_song(name)))
-    controls: Controls = load_player("zero-shot").play(score).ctrl[:, 0]
+    controls: Controls = load_player("zero-shot-20hz").play(score).ctrl[:, 0]
     return controls
 
 

@@ -98,11 +98,11 @@ def _score(seconds: float = 1.5) -> Score:
 
 
 def _performance(path: Path) -> None:
-    load_player("zero-shot", 0).play(_score()).save(path)
+    load_player("zero-shot-20hz", 0).play(_score()).save(path)
 
 
 def _demonstration(path: Path) -> None:
-    performance = load_player("zero-shot", 0).play(_score())
+    performance = load_player("zero-shot-20hz", 0).play(_score())
     assert performance.plan is not None
     Demonstration(performance.score, performance.plan, "tamper").save(path)
 
@@ -114,7 +114,9 @@ def _with_demonstration(path: Path) -> Demonstration:
 
 def _result(path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        evaluate("beethoven-ode-to-joy", "zero-shot", effort=0, seconds=1.0, jobs=1, out=folder)
+        evaluate(
+            "beethoven-ode-to-joy", "zero-shot-20hz", effort=0, seconds=1.0, jobs=1, out=folder
+        )
         (made,) = Path(folder, "songs").glob("*.json")
         path.mkdir()
         shutil.copy(made, path / made.name)

@@ -47,14 +47,14 @@ def test_their_card_begins_with_what_hubs_read() -> None:
 
 
 def test_fingers_add_something() -> None:
-    """To what the zero-shot player makes of songs that it did not learn from."""
+    """To what the zero-shot player of frames makes of songs that it did not learn from."""
     some = [
         excerpt(Score.from_midi(songs.path(name)), seconds=12)
         for name in ("beethoven-ode-to-joy", "petzold-minuet-g", "satie-gymnopedie-1")
     ]
     with_it, without = (
         np.mean([load_player(name, 0).play(one).metrics()["f1"] for one in some])
-        for name in ("fingers", "zero-shot")
+        for name in ("fingers", "zero-shot-20hz")
     )
     assert with_it > without
 

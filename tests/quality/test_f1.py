@@ -48,7 +48,7 @@ REFERENCE = [row for row in TABLE if row.song not in songs.names()]
 
 @cache
 def f1(row: Row, path: Path) -> float:
-    player = load_player("zero-shot", row.effort)
+    player = load_player("zero-shot-20hz", row.effort)
     score = excerpt(Score.from_midi(path), seconds=row.seconds)
     return player.play(score).metrics()["f1"]
 

@@ -13,4 +13,4 @@ from pianomime.songs.find import find_song
 def song_controls() -> NDArray[np.float64]:
     """(T, 46) controls with which the hands really play: 8 s of a bundled song."""
     score = Score.from_midi(find_song("bach-prelude-c")).clip(0.0, 8.0)
-    return load_player("zero-shot").play(score).ctrl
+    return load_player("zero-shot-20hz").play(score).ctrl[:, 0]

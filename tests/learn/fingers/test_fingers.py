@@ -190,7 +190,7 @@ def test_what_was_trained_plays_and_is_taken_as_it_is(songs, two_notes, tmp_path
     player = load_player("fingers", 0)
     first, again = (player.play(two_notes.score) for _ in range(2))
     np.testing.assert_array_equal(first.ctrl, again.ctrl)
-    zero_shot = load_player("zero-shot", 0).play(two_notes.score)
+    zero_shot = load_player("zero-shot-20hz", 0).play(two_notes.score)
     assert not np.array_equal(first.ctrl, zero_shot.ctrl)
     written = made.stat().st_mtime_ns
     train_fingers([songs], tmp_path / "out", SMALL, 1)
