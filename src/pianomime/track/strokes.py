@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.plan.strikes import Strikes
-from pianomime.validation import above_zero, finite
+from pianomime.validation import above_zero, finite, one_of, within
 from pianomime.world.key_sensor import sounds_at
 from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.parameters import PARAMETERS, key_levers, key_travel
@@ -57,8 +57,8 @@ class StrokeConfig:
         finite(self)
         for name in ("longest", "shortest", "ramp", "rise"):
             above_zero(name, getattr(self, name))
-        if self.touch not in TOUCHES:
-            raise ValueError(f"there is no touch {self.touch!r}; there are {', '.join(TOUCHES)}")
+        within("shortest", self.shortest, 0, self.longest)
+        one_of("touch", self.touch, list(TOUCHES))
 
     def speeds(self, strikes: Strikes) -> NDArray[np.float64]:
         """(M,) Speed of each key's front edge at which it is to sound [m/s]."""
@@ -91,7 +91,8 @@ class Strokes:
     Attributes:
         strike: (n, 2, 5) index of the strike that each finger makes, -1 for none; hands (left,
             right), fingers thumb first.
-        height: (n, 2, 5) height of its fingertip over the resting key, less than 0 below it [m].
+        height: (n, 2, 5) height of its fingertip over the resting key, less than 0 below it [m];
+            0 where it makes none.
         force: (n, 2, 5) with which it pushes down [N].
         tight: (n, 2, 5) bool: the stroke itself, whose motion must be exact.
     """
