@@ -38,6 +38,7 @@ ALLOWED = {
     ("plan/hand_path.py", "alike_wrist: float = 0.05"),
     ("policies/finger_residual.py", "_DEPTH = 0.05"),
     ("track/dynamic.py", "_WRIST_TOLERANCE = 0.05"),
+    ("track/keystroke.py", "_WRIST_TOLERANCE = 0.05"),
     ("video/hands/repair.py", "[0.01, -0.05]"),
     ("video/hands/tracks.py", "_SAME_HAND = 0.05"),
     ("video/keyboard/refine.py", "[[0, -0.1], [-0.05, 0]]"),
@@ -45,6 +46,7 @@ ALLOWED = {
     # Angles [rad] and accelerations [m/s^2].
     ("plan/joint_path.py", '"WRJ1": -0.05'),
     ("plan/joint_path.py", '"LFJ5": 0.05'),
+    ("track/note_sampling.py", "wrist: float = 0.05"),
     ("plan/hand_path.py", "slide_acceleration=20.0"),
     # Times that have nothing to do with frames [s].
     ("music/metrics.py", "ONSET_TOLERANCE = 0.05"),
@@ -52,6 +54,7 @@ ALLOWED = {
     ("music/protocol.py", "offset_least: float = 0.050"),
     ("music/protocol.py", "pedal: float = 0.050"),
     ("songs/notation.py", "RELEASE = 0.05"),
+    ("track/note_cost.py", "_OPEN = 0.05"),
     ("commands/progress.py", "_LINE_SECONDS = 30.0"),
     # Shares, probabilities and costs.
     ("evaluation/diagnose.py", "_TOUCHED = 0.05"),

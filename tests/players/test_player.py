@@ -129,15 +129,25 @@ def test_a_player_asks_for_every_frame_once_and_records_what_happened() -> None:
         np.testing.assert_array_equal(world.key_state, performance.key_state[frame])
 
 
-def test_every_part_of_planning_says_how_far_it_is() -> None:
-    """The fingering, both paths and the controls: a bar each, which ends when the part does."""
+@pytest.mark.parametrize(
+    ("player", "effort", "parts"),
+    [
+        ("zero-shot", 0, ["paths", "controls"]),
+        ("zero-shot", 1, ["paths", "controls", "rehearsal"]),
+        ("zero-shot-20hz", 0, ["controls"]),
+    ],
+)
+def test_every_part_of_planning_says_how_far_it_is(
+    player: str, effort: int, parts: list[str]
+) -> None:
+    """The fingering, paths, controls: a bar each, which ends when the part does."""
     told: list[tuple[str, int, int]] = []
 
     def progress(phase: str, done: int, total: int, remark: str = "") -> None:
         told.append((phase, done, total))
 
-    load_player("zero-shot", 0).play(excerpt(two_notes(), seconds=1.0), progress)
-    parts = ["planning", "fingering", "hand paths", "controls", "playing"]
+    load_player(player, effort).play(excerpt(two_notes(), seconds=1.0), progress)
+    parts = ["planning", "fingering", "hand paths", *parts, "playing"]
     assert list(dict.fromkeys(phase for phase, _, _ in told)) == parts
     for part in parts[1:]:
         steps = [done for phase, done, _ in told if phase == part]
@@ -147,7 +157,7 @@ def test_every_part_of_planning_says_how_far_it_is() -> None:
 
     # Whoever plans without being asked how far it is tells nobody.
     before = len(told)
-    load_player("zero-shot", 0).start(excerpt(two_notes(), seconds=1.0))
+    load_player(player, effort).start(excerpt(two_notes(), seconds=1.0))
     assert len(told) == before
 
 
@@ -155,8 +165,8 @@ def test_frames_in_which_the_physics_broke_are_recorded(monkeypatch: pytest.Monk
     class Fragile(World):
         steps = 0
 
-        def step(self, ctrl: np.ndarray, pedal: bool = False) -> None:
-            super().step(ctrl, pedal)
+        def step(self, ctrl: np.ndarray, pedal: bool = False, parts: int = 1) -> None:
+            super().step(ctrl, pedal, parts=parts)
             Fragile.steps += 1
             if Fragile.steps in (3, 4, 8):
                 self.blow_ups += 1

@@ -85,20 +85,28 @@ def test_what_is_no_factory_is_one_line(plugin: Path, source: str, message: str)
 
 def test_a_player_of_somebody_else_is_evaluated_without_a_fork(plugin: Path) -> None:
     results = evaluate(
-        ["twinkle-twinkle"], "their_player:make_player", effort=0, seconds=2, jobs=1, out="out"
+        ["twinkle-twinkle"],
+        "their_player:make_player",
+        effort=0,
+        seconds=2,
+        lead_in=0.5,
+        jobs=1,
+        out="out",
     )
     (row,) = results["songs"]
     assert row["player"] == "mine 1"
     assert row["f1"] > 0.9
+    assert row["music"]["note_f1_50"] > 0.9
 
 
 def test_an_instance_is_evaluated_in_this_process() -> None:
     base = load_player("zero-shot", effort=0)
     assert isinstance(base, PlannedPlayer)
     mine = PlannedPlayer("mine", base.planner, base.tracker)
-    results = evaluate(["twinkle-twinkle"], mine, seconds=2)
+    results = evaluate(["twinkle-twinkle"], mine, seconds=2, lead_in=0.5)
     assert results["player"] == "mine"
     assert results["songs"][0]["f1"] > 0.9
+    assert results["songs"][0]["music"]["note_f1_50"] > 0.9
     with pytest.raises(InputError, match="takes no settings"):
         load_player(mine, planner={"beam": 3})
 
@@ -160,7 +168,7 @@ def test_efforts_and_seeds_out_of_range(effort: int, seed: int) -> None:
 
 def test_settings_reach_planner_tracker_and_search() -> None:
     player = load_player(
-        "zero-shot", 1, planner={"beam": "7"}, **{"tracker.force": 6, "sampling.rounds": 1}
+        "zero-shot-20hz", 1, planner={"beam": "7"}, **{"tracker.force": 6, "sampling.rounds": 1}
     )
     assert isinstance(player, PlannedPlayer)
     assert player.planner.config.fingering.beam == 7

@@ -55,7 +55,7 @@ def test_a_controller_that_works_the_pedal_does() -> None:
 
 
 def test_it_is_the_only_such_loop() -> None:
-    """Nobody else asks for controls and steps a World by them; predictive sampling looks ahead."""
+    """Nobody else asks for controls and steps a World by them, but to look ahead or rehearse."""
     both = []
     for file in sorted(ROOM.rglob("*.py")):
         for function in ast.walk(ast.parse(file.read_text("utf-8"))):
@@ -68,4 +68,9 @@ def test_it_is_the_only_such_loop() -> None:
             }
             if {"control", "step"} <= called:
                 both.append((file.relative_to(ROOM).as_posix(), function.name))
-    assert both == [("players/rollout.py", "rollout"), ("track/predictive_sampling.py", "_search")]
+    assert both == [
+        ("players/rollout.py", "rollout"),
+        ("track/note_sampling.py", "_look_ahead"),
+        ("track/predictive_sampling.py", "_search"),
+        ("track/rehearsal.py", "_listen"),
+    ]

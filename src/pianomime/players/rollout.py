@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS
-from pianomime.track import Controller, PedalController
+from pianomime.track import Controller, PedalController, controls_per_frame
 from pianomime.world import World
 from pianomime.world.key_sensor import NOTHING, KeyEvents
 
@@ -35,12 +35,13 @@ def rollout(controller: Controller, world: World, pedal: NDArray[np.bool_]) -> I
     """Play frame after frame, and yield each when the world is in the state after it.
 
     Args:
-        controller: gives the controls; one that works the pedal gives that as well.
+        controller: gives the controls, once or several times a frame (see `FineController`); one
+            that works the pedal gives that as well.
         world: where it is played, in the state before the first frame.
         pedal: (T,) bool, the pedal of the score in every frame.
     """
     pedalling = controller if isinstance(controller, PedalController) else None
-    parts = getattr(controller, "controls_per_frame", 1)
+    parts = controls_per_frame(controller)
     for frame in range(len(pedal)):
         sent, events = [], NOTHING
         for part in range(parts):

@@ -1,6 +1,12 @@
 """Trackers: from a FingertipPlan to a Controller."""
 
-from pianomime.track.controller import BatchController, Controller, PedalController
+from pianomime.track.controller import (
+    BatchController,
+    Controller,
+    FineController,
+    PedalController,
+    controls_per_frame,
+)
 from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
 from pianomime.track.keystroke import KeystrokeConfig, KeystrokeTracker
@@ -16,6 +22,7 @@ __all__ = [
     "Controller",
     "DynamicConfig",
     "DynamicTracker",
+    "FineController",
     "IkConfig",
     "IkTracker",
     "KeystrokeConfig",
@@ -29,4 +36,5 @@ __all__ = [
     "RehearsedTracker",
     "ReplayTracker",
     "Tracker",
+    "controls_per_frame",
 ]

@@ -36,8 +36,8 @@ class Controller(Protocol):
         """The control for `World.step` in one frame.
 
         Args:
-            frame: 0 for the first.
-            world: as it is before the frame; it must not be changed.
+            frame: 0 for the first. For a `FineController` it is the number of the control.
+            world: as it is before the frame, or before that control; it must not be changed.
 
         Returns:
             (46,) targets of the position actuators, right then left hand [rad, m]; or (S, 46),
@@ -53,6 +53,26 @@ class PedalController(Controller, Protocol):
     def pedal(self, frame: int) -> bool:
         """Whether the pedal is down in the frame whose control was asked for last."""
         ...
+
+
+@runtime_checkable
+class FineController(Controller, Protocol):
+    """A controller that looks at the world several times a frame, and gives a control each time.
+
+    With S controls a frame, `control` is asked for the controls 0, 1, ... of the whole performance:
+    number n is held in part n % S of frame n // S, with `World.step(ctrl, parts=S)`, and gets the
+    world as it is before that part. Each control is (46,).
+    """
+
+    @property
+    def controls_per_frame(self) -> int:
+        """S, the number of controls that follow one another in a frame; it divides 10."""
+        ...
+
+
+def controls_per_frame(controller: Controller) -> int:
+    """How many times a frame a controller is to be asked; 1 for all but a `FineController`."""
+    return controller.controls_per_frame if isinstance(controller, FineController) else 1
 
 
 class BatchController(Controller, Protocol):

@@ -8,6 +8,7 @@ is, is up to the score.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.plan.joint_path import KEY_REST, PathConfig, resting_height, smooth_path
 from pianomime.plan.strikes import Strikes
-from pianomime.progress import Steps
+from pianomime.progress import Steps, ignore
 from pianomime.track.dynamic import motion_torque, to_actuators
 from pianomime.track.finger_feedback import lift_joints, reach_joints, shared
 from pianomime.track.strokes import Corrections, StrokeConfig, strokes_of
@@ -129,23 +130,38 @@ class KeystrokeController:
         self._x = plan.fingertips[frame, strikes.hand, 1 + strikes.finger, 0]
         hinge = key_centres()[strikes.key, 0] - key_half_sizes()[strikes.key, 0]
         self._reach = self._x - hinge
-        self._paths = [self._coarse_path(index) for index in range(len(hands))]
-        self.correct(Corrections.none(len(strikes)), config.refine)
+        steps = Steps("paths", len(hands) * config.path.iterations * len(plan))
+        self._paths = [self._coarse_path(index, steps) for index in range(len(hands))]
+        steps = Steps("controls", self._steps(config.refine))
+        self._aim(Corrections.none(len(strikes)), config.refine, steps.advance)
 
     @property
     def controls_per_frame(self) -> int:
         """Number of controls that follow one another in a frame."""
         return self.config.controls
 
-    def correct(self, corrections: Corrections, iterations: int | None = None) -> None:
+    @property
+    def correction_steps(self) -> int:
+        """The steps of `correct`, as it counts them."""
+        return self._steps(self.config.again)
+
+    def correct(self, corrections: Corrections, advance: Callable[[int], None] = ignore) -> None:
         """Aim at other times and speeds.
 
         Args:
             corrections: of the strikes.
-            iterations: Gauss-Newton steps of the paths; `again` of the settings if None.
+            advance: called with a number of steps as they are done, `correction_steps` in all.
         """
+        self._aim(corrections, self.config.again, advance)
+
+    def _steps(self, iterations: int) -> int:
+        return len(self._hands) * (iterations + 2) * len(self._times)
+
+    def _aim(
+        self, corrections: Corrections, iterations: int, advance: Callable[[int], None]
+    ) -> None:
+        """Compute paths, in so many Gauss-Newton steps from those there are, and controls."""
         self.corrections = corrections
-        iterations = self.config.again if iterations is None else iterations
         self._strokes = strokes_of(
             self.strikes, corrections, self._reach, self._times, self.config.stroke
         )
@@ -154,7 +170,6 @@ class KeystrokeController:
         self._press = np.zeros((count, 2, FINGER_COUNT, LAYOUT.hand_actuators))
         self._tips = np.empty((2, count + 1, FINGER_COUNT, 3))
         config = replace(self.config.path, iterations=iterations)
-        steps = Steps("controls", len(SIDES) * (iterations + 2) * count)
         # An idle finger counts for the time for which it is idle, a stroke for each of its points.
         share = 1.0 / np.sqrt(self.config.controls)
         for index, hand in enumerate(self._hands):
@@ -168,17 +183,17 @@ class KeystrokeController:
                 weights,
                 np.full((count, FINGER_COUNT), np.nan),
                 config,
-                steps.advance,
+                advance,
                 self._dt,
                 self._paths[index][1:],
             )
             self._paths[index] = path
             self._follow(index, hand, path)
-            steps.advance(count)
+            advance(count)
             torque = to_actuators(hand, motion_torque(hand, path, self._dt)) / hand.gain
             self._feedforward[:, hand.actuators] = (path[1:] + path[:-1]) / 2 @ hand.to_ctrl.T
             self._feedforward[:, hand.actuators] += torque
-            steps.advance(count)
+            advance(count)
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) right then left: feed-forward, and a share of the present errors.
@@ -221,7 +236,7 @@ class KeystrokeController:
         """[s] Length of a control."""
         return FRAME_SECONDS / self.config.controls
 
-    def _coarse_path(self, index: int) -> NDArray[np.float64]:
+    def _coarse_path(self, index: int, steps: Steps) -> NDArray[np.float64]:
         """(n + 1, 27) The path to begin with: one of frames, straight between them."""
         hand, frames = self._hands[index], len(self.plan)
         self._strokes = strokes_of(
@@ -233,7 +248,6 @@ class KeystrokeController:
         )
         targets, weights = self._targets(index)
         ends = slice(self.config.controls - 1, None, self.config.controls)
-        steps = Steps("paths", self.config.path.iterations * frames)
         path = smooth_path(
             hand,
             np.zeros(LAYOUT.hand_joints),

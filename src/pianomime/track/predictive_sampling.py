@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.plan import FingertipPlan
-from pianomime.track.controller import Controller
+from pianomime.track.controller import Controller, controls_per_frame
 from pianomime.track.tracker import Tracker
 from pianomime.track.variations import VariationConfig, Variations
 from pianomime.validation import within
@@ -72,7 +72,8 @@ class PredictiveSamplingTracker:
         """A controller; for the same plan it draws the same variations.
 
         Raises:
-            InputError: the other tracker's controller is not replayable, or has no plan.
+            InputError: the other tracker's controller is not replayable, has no plan, or gives
+                several controls a frame.
         """
         goal = plan.keys() if self._goal is None else self._goal
         return PredictiveSamplingController(
@@ -95,7 +96,7 @@ class PredictiveSamplingController:
         threads: how many variations step at the same time; 0 for one on each core.
 
     Raises:
-        InputError: `base` is not replayable, or has no plan.
+        InputError: `base` is not replayable, has no plan, or gives several controls a frame.
     """
 
     replayable = False
@@ -114,6 +115,11 @@ class PredictiveSamplingController:
             )
         if base.plan is None:
             raise InputError("predictive sampling needs a plan, to know which fingers to vary")
+        if controls_per_frame(base) > 1:
+            raise InputError(
+                f"predictive sampling needs one control a frame, but {type(base).__name__} gives "
+                f"{controls_per_frame(base)}: such controllers are for note sampling"
+            )
         self.config = config
         self.plan = base.plan
         self.steps = 0

@@ -77,7 +77,8 @@ class RehearsedTracker:
     def start(self, plan: FingertipPlan) -> KeystrokeController:
         """A controller whose strikes are corrected."""
         controller = self._tracker.start(plan)
-        steps = Steps("rehearsal", self.config.passes * len(plan))
+        each = len(plan) + controller.correction_steps
+        steps = Steps("rehearsal", self.config.passes * each)
         for _ in range(self.config.passes):
             heard = _listen(controller, steps)
             controller.correct(
@@ -87,7 +88,8 @@ class RehearsedTracker:
                     controller.speeds,
                     heard,
                     self.config,
-                )
+                ),
+                steps.advance,
             )
         return controller
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.errors import InputError
 from pianomime.keyboard import KEYS
 from pianomime.music import Score, frame_metrics
 from pianomime.players.rollout import rollout
@@ -125,6 +126,9 @@ def record(controller: Controller, base: Controller, score: Score) -> dict[str, 
 
     Returns:
         The columns; those that `fill_columns` fills are not filled yet.
+
+    Raises:
+        InputError: the controller gives several controls a frame, which is no action of a frame.
     """
     pedal, world = score.pedal_roll(), World(quiet=True)
     columns = empty_columns(len(pedal))
@@ -137,6 +141,11 @@ def record(controller: Controller, base: Controller, score: Score) -> dict[str, 
 
     observe(0)
     for step in rollout(controller, world, pedal):
+        if step.ctrl.ndim > 1:
+            raise InputError(
+                f"a data set has one control a frame, not {len(step.ctrl)}: collect from a player "
+                "of frames, such as zero-shot-20hz"
+            )
         columns["action"][step.frame] = step.ctrl
         columns["pressed"][step.frame] = world.pressed
         if step.frame + 1 < len(pedal):
