@@ -16,13 +16,15 @@ from pianomime.world.parameters import key_centres
 
 @pytest.mark.filterwarnings("ignore::pianomime.world.PhysicsWarning")
 # Those that learned have weights, and tests, of their own.
-@pytest.mark.parametrize("player", ["zero-shot", "zero-shot-ik"])
+@pytest.mark.parametrize(
+    ("player", "controls"), [("zero-shot", 5), ("zero-shot-20hz", 1), ("zero-shot-ik", 1)]
+)
 @settings(max_examples=12, deadline=None)
 @given(score=scores())
-def test_any_score_is_played(player: str, score: Score) -> None:
+def test_any_score_is_played(player: str, controls: int, score: Score) -> None:
     performance = load_player(player).play(score)
     frames = len(score.roll())
-    assert performance.ctrl.shape == (frames, 46)
+    assert performance.ctrl.shape == (frames, controls, 46)
     assert performance.qpos.shape == (frames, 142)
     assert performance.key_state.shape == performance.pressed.shape == (frames, 88)
     for name in ("ctrl", "qpos", "key_state"):

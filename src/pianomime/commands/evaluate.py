@@ -24,7 +24,7 @@ class Evaluate:
     zero-shot` lists those of the zero-shot player.
 
     Players:
-      planned: zero-shot, zero-shot-ik, fingers
+      planned: zero-shot, zero-shot-20hz, zero-shot-ik, fingers
       learned: two-stage-diff, two-stage-diff-no-sdf, two-stage-diff-res,
         two-stage-bet, two-stage-mse, one-stage-diff, bc-mse, multi-task-sac
       of DEMO.npz: demonstration, demonstration-ik
@@ -50,9 +50,9 @@ class Evaluate:
     """Who plays: a name (see `pianomime players`), PACKAGE.MODULE:FACTORY, the folder of an expert
     (see `pianomime train-expert`) or of weights (see `pianomime train`)."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
-    """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
-    On two cores 1 takes about as long as the music or less, 2 and 3 several times longer. For
-    generalists it is 2, 5, 20 or 100 steps of the diffusion."""
+    """How hard to try: 0 plays in one pass; 1 to 3 try variations where notes would go wrong, and
+    zero-shot rehearses first. On two cores 1 takes about as long as the music or less, 2 and 3
+    several times longer. For generalists it is 2, 5, 20 or 100 steps of the diffusion."""
     settings: tyro.conf.Suppress[dict[str, Any]] = field(default_factory=dict)
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS

@@ -27,7 +27,7 @@ class Play:
     zero-shot` lists those of the zero-shot player.
 
     Players:
-      planned: zero-shot, zero-shot-ik, fingers
+      planned: zero-shot, zero-shot-20hz, zero-shot-ik, fingers
       learned: two-stage-diff, two-stage-diff-no-sdf, two-stage-diff-res,
         two-stage-bet, two-stage-mse, one-stage-diff, bc-mse, multi-task-sac
       of DEMO.npz: demonstration, demonstration-ik
@@ -58,9 +58,9 @@ class Play:
     (see `pianomime train-expert`) or of weights (see `pianomime train`). zero-shot if not given,
     and for demonstrations, demonstration."""
     effort: Annotated[int, tyro.conf.arg(metavar="0..3")] = 1
-    """How hard to try: 0 plays in one pass; 1 to 3 first try variations where notes would go wrong.
-    On two cores 1 takes about as long as the music or less, 2 and 3 several times longer. For
-    generalists it is 2, 5, 20 or 100 steps of the diffusion."""
+    """How hard to try: 0 plays in one pass; 1 to 3 try variations where notes would go wrong, and
+    zero-shot rehearses first. On two cores 1 takes about as long as the music or less, 2 and 3
+    several times longer. For generalists it is 2, 5, 20 or 100 steps of the diffusion."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Seed of everything that is random."""
     settings: tyro.conf.Suppress[dict[str, Any]] = field(default_factory=dict)

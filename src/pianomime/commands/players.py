@@ -8,10 +8,10 @@ from typing import Annotated
 import tyro
 
 _ABOUT = {
-    "zero-shot": "plans, rehearses, plays with touch",
-    "zero-shot-20hz": "plans frames, as in the paper",
+    "zero-shot": "plays notes in time, with touch",
+    "zero-shot-20hz": "plays frames, as in the paper",
     "zero-shot-ik": "the same, the paper's tracker",
-    "fingers": "zero-shot, a learned residual",
+    "fingers": "zero-shot-20hz and a residual",
     "two-stage-diff": "diffusion policies, two levels",
     "two-stage-diff-no-sdf": "the same, without a goal encoder",
     "two-stage-diff-res": "the same, on the paper's tracker",

@@ -12,6 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
 from pianomime.music.score import MAX_SECONDS, Score
+from pianomime.short_repr import short_repr
 
 _DECIMALS = 4
 
@@ -42,6 +43,8 @@ class Candidates:
     played: NDArray[np.int64]
     late: NDArray[np.float64]
     shape: tuple[int, int]
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, wanted: Score, played: Score, tolerance: float) -> Candidates:
