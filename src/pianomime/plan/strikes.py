@@ -10,12 +10,15 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.keyboard import FRAME_SECONDS
+from pianomime.keyboard import FRAME_RATE, FRAME_SECONDS
 from pianomime.music import Score
 from pianomime.music.voices import INNER, voices
 from pianomime.plan.fingering import Fingering
 from pianomime.short_repr import short_repr
 
+_EDGE = 0.005
+"""[s] A key is struck no nearer than this to the ends of the frame in which it begins: frames are
+looked at when they end, and nobody hears so little."""
 _LINGER = 0.008
 """[s] From the end of the last frame that needs a key until it is let go: frames are looked at when
 they end."""
@@ -83,7 +86,10 @@ def strikes_of(score: Score, fingering: Fingering) -> Strikes:
     note = np.flatnonzero((fingering.hand >= 0) & (fingering.stop > fingering.start))
     key, frames = score.key[note].astype(np.int64), score.note_frames()[note]
     late = np.maximum(fingering.start[note] - frames[:, 0], 0)
-    onset = score.onset[note] + late * FRAME_SECONDS
+    # A key that is struck again while it is down is down one frame later than it sounds.
+    begins = np.floor(score.onset[note] * FRAME_RATE) * FRAME_SECONDS
+    place = (score.onset[note] - begins).clip(_EDGE, FRAME_SECONDS - _EDGE)
+    onset = begins + place + late * FRAME_SECONDS
     stop = fingering.stop[note] * FRAME_SECONDS
     # A hand that must be elsewhere leaves at once.
     cut = fingering.stop[note] < frames[:, 1]
