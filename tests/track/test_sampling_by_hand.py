@@ -14,6 +14,7 @@ from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.plan import FingertipPlan
 from pianomime.track import PredictiveSamplingConfig
 from pianomime.track.predictive_sampling import PredictiveSamplingController
+from pianomime.track.variations import Variations
 from pianomime.world import World
 from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import key_centres
@@ -52,6 +53,13 @@ def controller(
     base = Bowing(plan)
     goal = np.zeros((FRAMES, KEYS), bool) if goal is None else goal
     return PredictiveSamplingController(base, config, goal)
+
+
+def blamed(
+    found: PredictiveSamplingController, frame: int, wrong: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """(46,) With which probability actuators are varied, by the keys (H, 88) that go wrong."""
+    return found._variations.probabilities(frame, np.argwhere(wrong))
 
 
 class Told:
@@ -95,7 +103,7 @@ def test_mostly_the_finger_that_goes_wrong_is_varied(hand: int) -> None:
     found = controller(plan_of({(hand, INDEX): 40, (1 - hand, LITTLE): 20}), config)
     wrong = np.zeros((5, KEYS), bool)
     wrong[2, 40] = True
-    probability = found._probabilities(0, wrong)
+    probability = blamed(found, 0, wrong)
     mine = np.full(LAYOUT.hand_actuators, 0.1)
     mine[LAYOUT.wrist_actuators] = mine[LAYOUT.slide_actuators] = 0.3
     mine[LAYOUT.finger_actuators[INDEX]] = 0.7
@@ -103,17 +111,17 @@ def test_mostly_the_finger_that_goes_wrong_is_varied(hand: int) -> None:
     assert not probability[LAYOUT.actuators[1 - hand]].any()
     # Both hands go wrong: neither takes away from the other.
     wrong[0, 20] = True
-    both = found._probabilities(0, wrong)
+    both = blamed(found, 0, wrong)
     np.testing.assert_array_equal(both[LAYOUT.actuators[hand]], mine)
     assert (both[LAYOUT.actuators[1 - hand]][LAYOUT.finger_actuators[LITTLE]] == 0.7).all()
-    assert not found._probabilities(0, np.zeros((5, KEYS), bool)).any()
+    assert not blamed(found, 0, np.zeros((5, KEYS), bool)).any()
 
 
 def test_two_wrong_fingers_of_a_hand_are_both_varied() -> None:
     found = controller(plan_of({(RIGHT, INDEX): 40, (RIGHT, LITTLE): 47}))
     wrong = np.zeros((5, KEYS), bool)
     wrong[1, [40, 47]] = True
-    mine = found._probabilities(0, wrong)[LAYOUT.actuators[RIGHT]]
+    mine = blamed(found, 0, wrong)[LAYOUT.actuators[RIGHT]]
     for finger, part in enumerate(LAYOUT.finger_actuators):
         wanted = QUICK.blamed if finger in (INDEX, LITTLE) else QUICK.others
         assert (mine[part] == wanted).all()
@@ -129,7 +137,7 @@ def test_a_key_that_nobody_should_press_is_blamed_on_the_nearest_finger() -> Non
     plan.fingertips[later, RIGHT, 0, 1] = key_centres()[key, 1]
     wrong = np.zeros((5, KEYS), bool)
     wrong[later - 1, key] = True
-    probability = controller(plan)._probabilities(1, wrong)
+    probability = blamed(controller(plan), 1, wrong)
     mine = probability[LAYOUT.actuators[LEFT]][LAYOUT.finger_actuators[LITTLE]]
     assert (mine == QUICK.blamed).all()
     assert not probability[LAYOUT.actuators[RIGHT]].any()
@@ -137,11 +145,9 @@ def test_a_key_that_nobody_should_press_is_blamed_on_the_nearest_finger() -> Non
 
 def test_variations_are_linear_between_knots_and_as_large_as_they_should_be() -> None:
     config = PredictiveSamplingConfig(variations=6000, knots=4, ahead=8)
-    found = controller(plan_of({}), replace(config, variations=1))
-    found.config = config
     probability = np.zeros(LAYOUT.ctrl_size)
     probability[[0, 5, 12]] = 1.0, 0.25, 1.0
-    made = found._variations(8, probability)
+    made = Variations(plan_of({}), config).draw(8, probability)
     assert made.shape == (6000, 8, LAYOUT.ctrl_size)
     assert not made[..., probability == 0].any()
     for first in (0, 4):
@@ -181,9 +187,9 @@ def slowly(
             wrong.append(ahead.pressed != goal[each])
         steps += len(horizon)
         if np.any(wrong[: config.commit + 2]):
-            probability = same._probabilities(frame, np.array(wrong))
+            probability = blamed(same, frame, np.array(wrong))
             for _ in range(config.rounds):
-                varied = np.array(best) + same._variations(len(horizon), probability)
+                varied = np.array(best) + same._variations.draw(len(horizon), probability)
                 tries = [np.array(best), *varied[1:]]
                 costs = []
                 for one in tries:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.plan.strikes import Strikes
+from pianomime.short_repr import short_repr
 from pianomime.validation import above_zero, finite, one_of, within
 from pianomime.world.key_sensor import sounds_at
 from pianomime.world.layout import FINGER_COUNT
@@ -78,6 +79,8 @@ class Corrections:
     advance: NDArray[np.float64]
     speed: NDArray[np.float64]
 
+    __repr__ = short_repr
+
     @classmethod
     def none(cls, strikes: int) -> Corrections:
         """Those of strikes that have not been rehearsed."""
@@ -101,6 +104,8 @@ class Strokes:
     height: NDArray[np.float64]
     force: NDArray[np.float64]
     tight: NDArray[np.bool_]
+
+    __repr__ = short_repr
 
 
 def strokes_of(

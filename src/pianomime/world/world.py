@@ -37,9 +37,10 @@ class World(WorldState):
         sounding: (88,) bool: keys that sound, as they sense it (see `world.key_sensor`).
         key_events: note-ons and note-offs of the last step, timed between physics steps.
         blow_ups: number of control steps since the last reset in which the physics became
-            unstable. Such a step ends in a recovery pose: forearms along the keyboard where they
-            were before the step, hands open above the keys, all keys up. (Wedged fingers left in
-            place would become unstable again at once.)
+            unstable. Such a step, or the part of it with one of several controls, ends in a
+            recovery pose: forearms along the keyboard where they were before it, hands open above
+            the keys, all keys up. (Wedged fingers left in place would become unstable again at
+            once.)
         quiet: whether unstable physics raises no `PhysicsWarning`.
     """
 

@@ -48,7 +48,7 @@ def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
         columns = episode.columns
         assert episode.f1 == pytest.approx(performance.metrics()["f1"])
         np.testing.assert_array_equal(columns["pressed"], performance.pressed)
-        np.testing.assert_allclose(columns["action"], performance.ctrl, atol=1e-6)
+        np.testing.assert_allclose(columns["action"], performance.ctrl[:, 0], atol=1e-6)
         np.testing.assert_allclose(
             columns["base_control"] + columns["residual"], columns["action"], atol=1e-6
         )
