@@ -201,7 +201,9 @@ _FRAME_COSTS = {
 ABLATIONS = (
     Ablation("controls finer than a frame", "one a frame", {"settings": {"tracker.controls": 1}}),
     Ablation("rehearsal", "none", {"settings": {"rehearsal.passes": 0}}),
-    Ablation("search", "effort 0", {"effort": 0}),
+    # A single variation is the controls as they are.
+    Ablation("search", "none", {"settings": {"sampling.variations": 1}}),
+    Ablation("rehearsal and search", "effort 0", {"effort": 0}),
     Ablation("touch", "one velocity for all notes", {"player": "music:one_velocity"}),
     Ablation("fingering where notes count", "where frames count", {"settings": _FRAME_COSTS}),
     Ablation("lead-in", "none", {"lead_in": 0.0}),
