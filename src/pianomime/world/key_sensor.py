@@ -1,9 +1,9 @@
 """What a key senses: when it sounds and falls silent between frames, and how fast it went down.
 
 A real key sounds near the bottom of its way, and sounds again only after it has come back: in a
-grand piano's double escapement until the jack is under the hammer again. Here a key sounds where the
-paper counts it as pressed (0.5 degrees before its stop), and is silent, and ready to sound again, when
-it has come back to half of its way, where a grand piano's damper meets the strings.
+grand piano's double escapement until the jack is under the hammer again. Here a key sounds where
+the paper counts it as pressed (0.5 degrees before its stop), and is silent, and ready to sound
+again, when it has come back to half of its way, where a grand piano's damper meets the strings.
 `docs/concepts/touch.md` names the sources.
 """
 
