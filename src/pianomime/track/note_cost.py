@@ -31,13 +31,13 @@ class NoteCostConfig:
     phantom: float = 1.2
     """Cost of a strike that nobody wanted."""
     late: float = 0.3
-    """Cost of a strike that is 48 ms early or late; less are in proportion, above 8 ms."""
+    """Cost of a strike that is 48 ms early or late, in proportion above 8 ms up to 68 ms."""
     touch: float = 0.15
-    """Cost of a velocity that is 16 steps off; less are in proportion, above 4 steps."""
+    """Cost of a velocity that is 16 steps off, in proportion above 4 steps up to 22 steps."""
     frame: float = 0.1
     """Cost of a key that is wrong at the end of a frame."""
     notice: float = 0.15
-    """Costs of time and touch of a strike above which it is wrong."""
+    """Costs of time and touch of a strike, together, above which it is among what goes wrong."""
     match: float = 0.12
     """A strike further than this from the onset is another one [s]."""
 
@@ -47,7 +47,7 @@ class NoteCostConfig:
 
 
 class Strike(NamedTuple):
-    """A key that sounded.
+    """A key that sounded, as opposed to `Strikes`, which are to sound.
 
     Attributes:
         key: 0..87.

@@ -9,7 +9,7 @@ wrong.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -120,8 +120,9 @@ class NoteSamplingController:
         self.config, self.plan, self.steps = config, base.plan, 0
         self._base = base
         self._goal = base.plan.keys()
-        touch = TOUCHES[base.config.stroke.touch]
-        self._cost = NoteCost(base.strikes, self._goal, touch, config.cost)
+        stroke = base.config.stroke
+        wanted = replace(base.strikes, velocity=stroke.velocities(base.strikes))
+        self._cost = NoteCost(wanted, self._goal, TOUCHES[stroke.touch], config.cost)
         self._variations = Variations(base.plan, config)
         self._batch = WorldBatch(config.variations, threads, quiet=True)
         self._chosen: list[_Step] = []

@@ -21,6 +21,8 @@ from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.parameters import PARAMETERS, key_levers, key_travel
 from pianomime.world.touch import DEFAULT_TOUCH, TOUCHES
 
+_EVEN = 64
+"""MIDI velocity of notes that are all struck alike."""
 _TIGHT = 0.01
 """[s] After the onset, in which the path of the finger is as exact as before it."""
 
@@ -32,7 +34,7 @@ class StrokeConfig:
     touch: str = DEFAULT_TOUCH
     """Name of the map from MIDI velocity to the speed of a key, as in `world.touch.TOUCHES`."""
     even: bool = False
-    """Whether all notes are struck alike, with a velocity of 64."""
+    """Whether all notes are struck alike, with a velocity of 64, whatever the score says."""
     settle: float = 0.03
     """Time for which the finger is over its key before the stroke begins [s]."""
     gap: float = 0.0005
@@ -61,10 +63,13 @@ class StrokeConfig:
         within("shortest", self.shortest, 0, self.longest)
         one_of("touch", self.touch, list(TOUCHES))
 
+    def velocities(self, strikes: Strikes) -> NDArray[np.int64]:
+        """(M,) MIDI velocity with which each is to sound, 1 to 127."""
+        return np.full(len(strikes), _EVEN) if self.even else strikes.velocity
+
     def speeds(self, strikes: Strikes) -> NDArray[np.float64]:
         """(M,) Speed of each key's front edge at which it is to sound [m/s]."""
-        velocity = np.full(len(strikes), 64) if self.even else strikes.velocity
-        return TOUCHES[self.touch].speed_of(velocity, strikes.key)
+        return TOUCHES[self.touch].speed_of(self.velocities(strikes), strikes.key)
 
 
 @dataclass(frozen=True, eq=False)
