@@ -64,10 +64,10 @@ def spreads(heard: Heard, score: Score) -> NDArray[np.float64]:
 def test_notes_within_a_frame_are_struck_at_their_times() -> None:
     late = scales(PLAIN)
     assert not np.isnan(late).any()
-    assert abs(np.median(late)) < 10
     assert np.median(np.abs(late)) < 10
-    # The same test sees whether strikes are at the beginnings of frames.
-    assert np.median(scales(PLAIN, by_frame=True)) < -12
+    assert np.percentile(np.abs(late), 90) < 20
+    # This sees whether strikes are at the beginnings of frames instead.
+    assert np.percentile(np.abs(scales(PLAIN, by_frame=True)), 90) > 25
 
 
 def test_more_controls_than_one_a_frame_are_needed_to_be_on_time() -> None:

@@ -50,8 +50,10 @@ class RehearsalConfig:
         whole_numbers(self)
         finite(self)
         within("passes", self.passes, 0)
-        for name in ("match", "slowest", "fastest"):
+        for name in ("match", "slowest"):
             above_zero(name, getattr(self, name))
+        within("slowest", self.slowest, 0, 1)
+        within("fastest", self.fastest, 1)
 
 
 class KeystrokeStarter(Protocol):
