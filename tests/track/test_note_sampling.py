@@ -1,0 +1,206 @@
+"""Note sampling: what it is worth, what it leaves alone, and the same thing written down slowly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from listening import listen, notes, plan_of, play, scale
+from pianomime.errors import InputError
+from pianomime.keyboard import FRAME_SECONDS
+from pianomime.music import Score
+from pianomime.plan import FingertipPlan
+from pianomime.track import (
+    KeystrokeConfig,
+    KeystrokeTracker,
+    NoteSamplingConfig,
+    NoteSamplingTracker,
+    controls_per_frame,
+)
+from pianomime.track.keystroke import KeystrokeController
+from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
+from pianomime.track.strokes import StrokeConfig
+from pianomime.track.variations import Variations
+from pianomime.world import World
+from pianomime.world.touch import TOUCHES
+
+PLAIN = KeystrokeTracker()
+QUICK = NoteSamplingConfig(variations=4, commit=2, ahead=4, knots=2, seed=3)
+NOTES_ALONE = NoteCostConfig(late=0.0, touch=0.0, frame=0.0)
+
+
+@cache
+def leaps(seed: int) -> Score:
+    """Six leaps a second of each hand, too quick to hit all."""
+    draw = np.random.default_rng(seed)
+    key = np.append(draw.integers(20, 38, 12), draw.integers(42, 64, 12))
+    return notes(key, np.tile(np.arange(12) * 0.16, 2), 0.13)
+
+
+@cache
+def plan_of_leaps(seed: int) -> FingertipPlan:
+    return plan_of(leaps(seed))
+
+
+def sampling(config: NoteSamplingConfig | None = None) -> NoteSamplingTracker:
+    return NoteSamplingTracker(PLAIN, config, threads=1)
+
+
+def test_fewer_notes_are_missed_and_fewer_struck_that_nobody_wanted() -> None:
+    faults = []
+    for tracker in (PLAIN, sampling()):
+        heard = [listen(tracker, plan_of_leaps(seed), leaps(seed)) for seed in (2, 5)]
+        faults.append(sum(each.missed + each.phantoms for each in heard))
+    assert faults[0] >= 6, "the passages have to be hard for the test to say anything"
+    assert faults[1] <= 0.6 * faults[0]
+
+
+def test_where_nothing_is_wrong_the_base_is_followed_bit_for_bit() -> None:
+    plan = plan_of(scale().clip(0, 2.0))
+    controller = sampling(NoteSamplingConfig(cost=NOTES_ALONE)).start(plan)
+    ctrl, heard = play(controller)
+    alone, heard_alone = play(PLAIN.start(plan))
+    np.testing.assert_array_equal(ctrl, alone)
+    assert heard == heard_alone
+    # What was looked ahead is kept: each frame was simulated once.
+    assert controller.steps == len(plan)
+
+
+def test_same_plan_same_controls_also_the_second_time_and_others_with_another_seed() -> None:
+    plan, tracker = plan_of_leaps(5), sampling(QUICK)
+    first, again = (play(tracker.start(plan))[0] for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+    threads = NoteSamplingTracker(PLAIN, QUICK, threads=2)
+    np.testing.assert_array_equal(play(threads.start(plan))[0], first)
+    assert not np.array_equal(play(sampling(replace(QUICK, seed=4)).start(plan))[0], first)
+
+
+def test_world_and_plan_are_left_as_they_were() -> None:
+    plan, world = plan_of_leaps(5), World()
+    kept = plan.fingertips.copy(), plan.finger_key.copy(), plan.strikes.onset.copy()
+    controller = sampling(QUICK).start(plan)
+    assert controller.plan is plan
+    assert not controller.replayable
+    assert controls_per_frame(controller) == 5
+    before = world.state()
+    for number in range(5):
+        controller.control(number, world)
+    np.testing.assert_array_equal(world.state(), before)
+    now = plan.fingertips, plan.finger_key, plan.strikes.onset
+    for one, other in zip(now, kept, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_more_effort_simulates_more() -> None:
+    steps = []
+    for effort in (1, 2):
+        config = replace(NoteSamplingConfig.of_effort(effort), variations=2)
+        controller = sampling(config).start(plan_of_leaps(5))
+        play(controller)
+        steps.append(controller.steps)
+    assert steps[1] > 1.5 * steps[0]
+
+
+def test_efforts_are_ever_larger_budgets() -> None:
+    budgets = [NoteSamplingConfig.of_effort(effort) for effort in (1, 2, 3)]
+    work = [budget.variations * budget.rounds for budget in budgets]
+    assert work == sorted(set(work))
+    alike = {"variations": budgets[0].variations, "rounds": budgets[0].rounds}
+    assert all(replace(each, **alike) == budgets[0] for each in budgets)
+
+
+def test_an_even_touch_is_wanted_where_strokes_are_even() -> None:
+    """Else it would vary all that is played as it is to be."""
+    score = scale(velocity=np.where(np.arange(14) % 2, 120, 20)).clip(0, 1.6)
+    plan = plan_of(score)
+    even = KeystrokeTracker(KeystrokeConfig(stroke=StrokeConfig(even=True)))
+    cost = NoteCostConfig(late=0.0, frame=0.0, touch=1.0, notice=1.2)
+    config = replace(QUICK, cost=cost, trigger=100.0)
+    controller = NoteSamplingTracker(even, config, threads=1).start(plan)
+    np.testing.assert_array_equal(play(controller)[0], play(even.start(plan))[0])
+    assert controller.steps == len(plan)
+
+
+def follow(
+    base: KeystrokeController, world: World, frames: range
+) -> tuple[NDArray[np.float64], list[Frame]]:
+    """What a controller does in a world: controls (H, S, 46), and what is heard."""
+    ctrl, heard = [], []
+    for frame in frames:
+        strikes = []
+        for number in range(5 * frame, 5 * frame + 5):
+            ctrl.append(base.control(number, world))
+            world.step(ctrl[-1], parts=5)
+            strikes += strikes_in(world.key_events, number * FRAME_SECONDS / 5)
+        heard.append(Frame(strikes, world.pressed))
+    return np.array(ctrl).reshape(-1, 5, 46), heard
+
+
+def slowly(plan: FingertipPlan, config: NoteSamplingConfig) -> tuple[NDArray[np.float64], int]:
+    """The controls (T, S, 46) that are played, and how often any were varied."""
+    base, world, goal = PLAIN.start(plan), World(), plan.keys()
+    cost = NoteCost(base.strikes, goal, TOUCHES["goebl-bresin"], config.cost)
+    variations = Variations(plan, config)
+    played: list[NDArray[np.float64]] = []
+    varied = 0
+    while len(played) < len(plan):
+        first = len(played)
+        frames = range(first, min(first + config.ahead, len(plan)))
+        best, heard = follow(base, world.copy(), frames)
+        value, wrong = cost.of(first, heard, min(config.commit + 2, len(frames)))
+        if wrong or value >= config.trigger:
+            varied += 1
+            _, wrong = cost.of(first, heard, len(frames))
+            probability = variations.probabilities(first, wrong)
+            for _ in range(config.rounds):
+                drawn = variations.draw(len(frames), probability, 5).reshape(-1, *best.shape)
+                tries = [best, *(best + drawn[1:])]
+                costs = []
+                for each in tries:
+                    other, heard, short = world.copy(), [], 0.0
+                    for frame, ctrl in zip(frames, each, strict=True):
+                        other.step(ctrl)
+                        begin = frame * FRAME_SECONDS
+                        heard.append(Frame(strikes_in(other.key_events, begin), other.pressed))
+                        short += 0.01 * np.abs(other.key_state - goal[frame]).sum()
+                    costs.append(cost.of(first, heard, len(frames))[0] + short)
+                best = tries[int(np.argmin(costs))]
+        for frame, ctrl in zip(frames[: config.commit], best, strict=False):
+            world.step(ctrl)
+            cost.heard(strikes_in(world.key_events, frame * FRAME_SECONDS))
+            played.append(ctrl)
+    return np.array(played), varied
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        replace(QUICK, cost=NoteCostConfig(notice=0.02)),
+        replace(QUICK, rounds=1, commit=3, ahead=3, trigger=0.05, cost=NoteCostConfig(notice=10.0)),
+    ],
+    ids=["a little wrong", "costs a little"],
+)
+def test_it_is_what_is_written_down_slowly(config: NoteSamplingConfig) -> None:
+    plan = plan_of(leaps(5).clip(0, 1.0))
+    wanted, varied = slowly(plan, config)
+    assert varied > 2
+    found, _ = play(sampling(config).start(plan))
+    np.testing.assert_array_equal(found.reshape(wanted.shape), wanted)
+
+
+@pytest.mark.parametrize("name", ["variations", "rounds", "commit", "ahead", "knots"])
+def test_budgets_are_one_or_more(name: str) -> None:
+    assert getattr(NoteSamplingConfig(**{name: 1}), name) == 1
+    with pytest.raises(InputError, match=f"{name} must be 1 or more"):
+        NoteSamplingConfig(**{name: 0})
+
+
+def test_a_plan_without_strikes_is_refused_in_one_line() -> None:
+    plan = replace(plan_of_leaps(5), strikes=None)
+    with pytest.raises(InputError, match="has no strikes") as error:
+        sampling().start(plan)
+    assert "\n" not in str(error.value)
