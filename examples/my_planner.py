@@ -31,7 +31,7 @@ def main() -> None:
     midi = pianomime.songs.path("twinkle-twinkle")
     score = pianomime.excerpt(pianomime.Score.from_midi(midi), seconds=3)
     plain = ZeroShotPlanner()
-    for name, planner in (("zero-shot", plain), ("high-fingers", HighFingers(plain))):
+    for name, planner in (("plain", plain), ("high-fingers", HighFingers(plain))):
         player = pianomime.PlannedPlayer(name, planner, DynamicTracker())
         print(f"{name:12} F1 {player.play(score).metrics()['f1']:.3f}")
 

@@ -14,7 +14,7 @@ from pianomime.shown import shown
 
 @dataclass(frozen=True)
 class TrainFingers:
-    """Train the finger residual, which all fingers add to the zero-shot player, by PPO.
+    """Train the finger residual, which all fingers add to zero-shot-20hz, by PPO.
 
     Many songs are played side by side, on the zero-shot plan and the dynamic tracker. All fingers
     share one policy, and each is rewarded for its own keys. Some songs are kept for validation. OUT

@@ -165,7 +165,7 @@ class FingerResidualTracker:
 
     Args:
         policy: the network: `observation` (10, SIZE) to actions (10, 5).
-        base: the dynamic tracker; with the settings of the zero-shot player if None.
+        base: the dynamic tracker; with the settings of `zero-shot-20hz` if None.
     """
 
     def __init__(self, policy: Inference, base: DynamicTracker | None = None) -> None:

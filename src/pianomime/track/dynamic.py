@@ -71,7 +71,7 @@ class DynamicTracker:
     """Follows any fingertip plan, a planner's or a human's.
 
     Args:
-        config: its settings; those of the zero-shot player if None.
+        config: its settings; those of `zero-shot-20hz` if None.
     """
 
     def __init__(self, config: DynamicConfig | None = None) -> None:

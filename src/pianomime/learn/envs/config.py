@@ -100,7 +100,7 @@ class EnvConfig:
 
     base: Literal["ik", "dynamic"] = "ik"
     """Base controller that the residual is added to: the paper's inverse kinematics, or the
-    dynamic tracker of the zero-shot player."""
+    dynamic tracker of `zero-shot-20hz`."""
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     action: ActionConfig = field(default_factory=ActionConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)
