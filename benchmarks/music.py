@@ -65,9 +65,9 @@ ALONE = ("modern/test12/clip061.mid", "etude12/PartitaNo26.mid", "pop/test12/pop
 """Songs whose real-time factor is measured."""
 
 DEVELOPMENT = {
-    "pop": ("pop/train", slice(0, None, 16), 6),
-    "GiantMIDI": ("giantmidi", slice(100, None, 265), 3),
-    "repertoire": ("repertoire", slice(0, None, 48), 3),
+    "pop": ("pop/train", slice(0, None, 32), 3),
+    "GiantMIDI": ("giantmidi", slice(100, None, 400), 2),
+    "repertoire": ("repertoire", slice(0, None, 48), 2),
 }
 """Folder of songs on which settings may be chosen, which of its files, and how many at most."""
 DEVELOPMENT_SECONDS = 20.0
