@@ -1,19 +1,20 @@
 """Whether every player still plays as it did, bit for bit.
 
 Plays the bundled songs, and three pieces of Etude-12 and three modern clips more where
-PIANOMIME_SHARED names reference data, at effort 0 with every player that comes with the program,
-and compares the controls and the F1 with those in digest.json. Controls are compared bit for bit,
-which holds on one kind of processor with one set of libraries (constraints.txt); `--f1` compares
-the F1 alone. On another kind of processor that of songs that are hard to play moves by 0.02.
+PIANOMIME_SHARED names reference data, at effort 0 with every player of frames that comes with the
+program, and compares the controls and the F1 with those in digest.json. Controls are compared bit
+for bit, which holds on one kind of processor with one set of libraries (constraints.txt); `--f1`
+compares the F1 alone. On another kind of processor that of songs that are hard to play moves by
+0.02.
 
     python benchmarks/digest.py              # compare; exit code 1 where something differs
     python benchmarks/digest.py --f1         # the F1 alone, within 0.003
     python benchmarks/digest.py --write      # make digest.json anew, and what tests compare with
 
-Tests compare with the F1 of the zero-shot player in tests/quality/f1.json, and with the plans and
-controls of stored_plans.py. Contacts make differences in the last bits, which there are from one
-kind of processor to another, grow until another note is missed. So f1.json holds what a song comes
-to on many processors: the mean and the lowest F1 of many plays whose plans differ in the last bits.
+Tests compare with the F1 of the zero-shot player of frames in tests/quality/f1.json, with how well
+the zero-shot player plays notes (stored_notes.py), and with the plans and controls of
+stored_plans.py. f1.json holds what a song comes to on many processors: the mean and the lowest F1
+of many plays whose plans differ in the last bits (disturbed.py).
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ import os
 import sys
 import warnings
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -35,17 +35,16 @@ import numpy as np
 
 import pianomime
 from common import ROOT, cores, parser
+from disturbed import disturbed
 from pianomime import Score, load_player, songs
 from pianomime.files import atomic
-from pianomime.plan import FingertipPlan, Planner
-from pianomime.players import PlannedPlayer
 from pianomime.players.builtin import ZERO_SHOT_20HZ
+from stored_notes import write_notes
 from stored_plans import write_plans
 
 STORED = Path(__file__).with_name("digest.json")
 F1_TABLE = ROOT / "tests" / "quality" / "f1.json"
-ZERO_SHOT = ZERO_SHOT_20HZ
-PLAYERS = (ZERO_SHOT, "zero-shot-ik", "fingers", "two-stage-diff", "two-stage-mse")
+PLAYERS = (ZERO_SHOT_20HZ, "zero-shot-ik", "fingers", "two-stage-diff", "two-stage-mse")
 DEMONSTRATION_PLAYERS = ("demonstration", "demonstration-ik")
 REFERENCE = ("etude12", "modern/test12")
 Stored = dict[str, dict[str, str | float]]
@@ -53,8 +52,6 @@ TOLERANCE = 0.003
 """Of the F1: songs that are easy to play keep it where the controls differ in the last bit."""
 PLAYS = {0: 16, 1: 4}
 """How often each song of f1.json is played, by effort; those of effort 1 are easy: they stay."""
-LAST_BITS = 1e-12
-"""Relative size of the disturbance; 1e-14, as plans of two processors differ, does the same."""
 
 
 class Job(NamedTuple):
@@ -81,7 +78,7 @@ def jobs(shared: Path | None) -> list[Job]:
             file.stem: str(file) for file in sorted((shared / "data" / folder).glob("*.mid"))[:3]
         }
     made = [Job(player, 0, name, path, 30.0) for player in PLAYERS for name, path in pieces.items()]
-    made += [Job(ZERO_SHOT, 1, name, pieces[name], 15.0) for name in bundled[:2]]
+    made += [Job(ZERO_SHOT_20HZ, 1, name, pieces[name], 15.0) for name in bundled[:2]]
     if shared is not None:
         clip = str(shared / "data" / "stan" / "reference.npz")
         made += [Job(player, 0, "Stan_1", clip, 30.0) for player in DEMONSTRATION_PLAYERS]
@@ -106,32 +103,10 @@ def play(job: Job) -> dict[str, str | float]:
     return {"controls": digest, "f1": round(performance.metrics()["f1"], 6)}
 
 
-@dataclass(frozen=True)
-class _Disturbed:
-    """A planner whose plans differ in the last bits, as on another kind of processor.
-
-    Attributes:
-        planner: whose plans.
-        seed: of the disturbance.
-    """
-
-    planner: Planner
-    seed: int
-
-    def plan(self, score: Score) -> FingertipPlan:
-        """The path of the joints is computed from these fingertips, and all controls from it."""
-        plan = self.planner.plan(score)
-        noise = np.random.default_rng(self.seed).standard_normal(plan.fingertips.shape)
-        return replace(plan, fingertips=plan.fingertips * (1.0 + LAST_BITS * noise))
-
-
 def disturbed_f1(job: Job, seed: int) -> float:
     """The F1 of a song with a plan that differs in the last bits."""
-    player = load_player(job.player, job.effort)
-    assert isinstance(player, PlannedPlayer)
-    player = replace(player, planner=_Disturbed(player.planner, seed))
     score = pianomime.excerpt(Score.from_midi(job.path), seconds=job.seconds)
-    f1: float = player.play(score).metrics()["f1"]
+    f1: float = disturbed(job.player, job.effort, score, seed).metrics()["f1"]
     return f1
 
 
@@ -143,7 +118,7 @@ def f1_table(
     if F1_TABLE.exists():
         table = {(row["song"], row["effort"]): row for row in json.loads(F1_TABLE.read_text())}
     for job in todo:
-        if job.player != ZERO_SHOT:
+        if job.player != ZERO_SHOT_20HZ:
             continue
         song = job.song
         if song not in songs.names():
@@ -197,6 +172,7 @@ def main() -> int:
             print(f"{row['controls']}  {row['f1']:.6f}  {verdict}  {job.name}", flush=True)
         if asked.write:
             write(found, stored, f1_table(todo, shared, pool))
+            write_notes(shared, pool)
     if asked.write:
         write_plans()
         return 0
