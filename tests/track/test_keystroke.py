@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,14 +17,19 @@ from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
+from pianomime.plan.joint_path import resting_height, smooth_path
 from pianomime.track import (
     KeystrokeConfig,
     KeystrokeTracker,
     RehearsedTracker,
     controls_per_frame,
+    keystroke,
 )
+from pianomime.track.note_cost import strikes_in
 from pianomime.track.strokes import StrokeConfig
 from pianomime.world import World
+from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
 
 FRAMES = 8
 PLAIN = KeystrokeTracker()
@@ -150,6 +156,104 @@ def test_a_control_depends_on_plan_number_and_world_alone() -> None:
     kept = forward[0].copy()
     forward[0][:] = 0
     np.testing.assert_array_equal(controller.control(0, world), kept)
+
+
+def beside(world: World, hand: Hand, meters: float) -> World:
+    """The same pose at rest, but for a forearm that is beside its place."""
+    qpos = world.qpos.copy()
+    qpos[hand.joints][LAYOUT.slide] += meters
+    other = World()
+    other.reset(qpos)
+    return other
+
+
+def test_a_finger_that_is_not_over_its_key_does_not_press_another_one() -> None:
+    """The forearm is a key too far, shortly before its thumb strikes."""
+    score = notes([44], [0.1], 0.3)
+    plan, key_width = plan_of(score), 0.0235
+    assert plan.strikes.hand.tolist() == [1]
+    struck = {}
+    for astray in (KeystrokeConfig().astray, 1.0):
+        controller = KeystrokeTracker(KeystrokeConfig(astray=astray)).start(plan)
+        world, keys = World(), []
+        for number in range(5 * len(plan)):
+            if number == 36:
+                world = beside(world, Hand("rh"), key_width)
+            world.step(controller.control(number, world), parts=5)
+            keys += [strike.key for strike in strikes_in(world.key_events, 0.0)]
+        struck[astray] = keys
+    assert set(struck.pop(1.0)) == {44, 46}
+    assert struck.popitem()[1] == [44]
+
+
+def test_the_forearm_comes_back_and_also_for_a_finger_that_strikes() -> None:
+    """The slide's own gain, and half of the error of a single finger that strikes."""
+    controller, world = PLAIN.start(plan_of(notes([44], [0.1], 0.3))), World()
+    for number in range(40):
+        world.step(controller.control(number, world), parts=5)
+    for side, gain in (("rh", 0.8 + 0.5), ("lh", 0.8)):
+        hand = Hand(side)
+        for off in (-0.003, 0.003):
+            there, here = (beside(world, hand, meters) for meters in (off, 0.0))
+            change = controller.control(40, there) - controller.control(40, here)
+            slide = change[hand.actuators][LAYOUT.slide_actuators][0]
+            assert slide == pytest.approx(-gain * off, rel=1e-3)
+
+
+@pytest.mark.parametrize(("height", "sinks"), [(0.02, True), (0.028, None), (0.04, False)])
+def test_an_idle_finger_that_has_sunk_between_keys_is_lifted(
+    height: float, sinks: bool | None
+) -> None:
+    """The hand that has nothing to do hangs down from its wrist."""
+    plan, world = plan_of(notes([44], [0.1], 0.3)), World()
+    hand = Hand("lh")
+    controls = [KeystrokeTracker(KeystrokeConfig(sunk=sunk)).start(plan) for sunk in (0.005, 1.0)]
+    for number in range(40):
+        world.step(controls[0].control(number, world), parts=5)
+    lifted, as_it_is = (each.control(40, world) for each in controls)
+    np.testing.assert_array_equal(lifted[hand.actuators], as_it_is[hand.actuators])
+    low = world.qpos.copy()
+    pose = low[hand.joints].copy()
+    wrist = slice(LAYOUT.slide + 1, LAYOUT.arm_joints)
+    for _ in range(5):
+        points, jacobian = hand.points_and_jacobian(pose)
+        down = jacobian[1:, 2, wrist].mean(axis=0)
+        pose[wrist] -= down * (points[1:, 2].mean() - height) / (down @ down)
+    low[hand.joints] = pose
+    sunk = World()
+    sunk.reset(low)
+    tips = hand.points(pose)[1:]
+    between = tips[:, 2] < resting_height(tips[:, 0]) - 0.005
+    assert len(set(between)) == 2 if sinks is None else (between == sinks).all()
+    lifted, as_it_is = (each.control(40, sunk) for each in controls)
+    change = (lifted - as_it_is)[hand.actuators]
+    for finger, actuators in enumerate(LAYOUT.finger_actuators):
+        assert change[actuators].any() == between[finger]
+    assert not (lifted - as_it_is)[Hand("rh").actuators].any()
+
+
+def test_strokes_count_for_each_of_their_points_and_all_else_for_its_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plan = plan_of(notes([44], [0.1], 0.3))
+    weights: list[NDArray[np.float64]] = []
+
+    def watched(*given: Any) -> NDArray[np.float64]:
+        weights.append(given[3])
+        return smooth_path(*given)
+
+    monkeypatch.setattr(keystroke, "smooth_path", watched)
+    found = {}
+    for controls in (1, 5):
+        KeystrokeTracker(KeystrokeConfig(controls=controls)).start(plan)
+        left, right = weights[-2:]
+        thumb = right[:, 1]
+        found[controls] = left[0, 1, 0], thumb[0, 0], thumb[-1, 0], thumb[:, 0].max()
+    idle_hand, before, after, stroke = np.array(found[5]) / found[1]
+    assert idle_hand == pytest.approx(5**-0.5)
+    assert before == pytest.approx(5**-0.5)
+    assert after == pytest.approx(5**-0.5)
+    assert stroke == pytest.approx(1.0)
 
 
 def arrays(plan: FingertipPlan) -> list[NDArray]:

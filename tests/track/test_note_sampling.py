@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from listening import listen, notes, plan_of, play, scale
 from pianomime.errors import InputError
-from pianomime.keyboard import FRAME_SECONDS
+from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
 from pianomime.track import (
@@ -26,6 +26,7 @@ from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_i
 from pianomime.track.strokes import StrokeConfig
 from pianomime.track.variations import Variations
 from pianomime.world import World
+from pianomime.world.key_sensor import NOTHING
 from pianomime.world.touch import TOUCHES
 
 PLAIN = KeystrokeTracker()
@@ -71,7 +72,7 @@ def test_where_nothing_is_wrong_the_base_is_followed_bit_for_bit() -> None:
 
 
 def test_same_plan_same_controls_also_the_second_time_and_others_with_another_seed() -> None:
-    plan, tracker = plan_of_leaps(5), sampling(QUICK)
+    plan, tracker = plan_of(leaps(5).clip(0, 1.3)), sampling(QUICK)
     first, again = (play(tracker.start(plan))[0] for _ in range(2))
     np.testing.assert_array_equal(first, again)
     threads = NoteSamplingTracker(PLAIN, QUICK, threads=2)
@@ -123,6 +124,36 @@ def test_an_even_touch_is_wanted_where_strokes_are_even() -> None:
     controller = NoteSamplingTracker(even, config, threads=1).start(plan)
     np.testing.assert_array_equal(play(controller)[0], play(even.start(plan))[0])
     assert controller.steps == len(plan)
+
+
+class Told:
+    """A batch of worlds that is told what its keys do."""
+
+    def __init__(self, key_state: NDArray[np.float64], blow_ups: list[int]) -> None:
+        self.key_state, self.blow_ups = key_state, np.array(blow_ups)
+        self.pressed = np.zeros(key_state.shape, bool)
+        self.sounding = np.zeros(key_state.shape, bool)
+        self.key_events = NOTHING
+
+    def set_state(self, state: NDArray[np.float64]) -> None:
+        pass
+
+    def step(self, ctrl: NDArray[np.float64]) -> None:
+        pass
+
+
+def test_keys_on_their_way_and_broken_physics_cost() -> None:
+    state, world = np.zeros((3, KEYS)), World()
+    state[1, 40] = 0.4
+    controller = sampling(QUICK).start(plan_of_leaps(5))
+    controller._batch = told = Told(state, [0, 0, 1])
+    world.sounding[[20, 30]] = True
+    # In the lead-in, in which no key should be down.
+    cost, heard = controller._roll_out(0, world, np.zeros((3, 2, 5, 46)))
+    np.testing.assert_allclose(cost, [0.0, 2 * 0.01 * 0.4, 100.0])
+    assert [len(each) for each in heard] == [2, 2, 2]
+    # A key that sounds does not sound again before it has come back.
+    np.testing.assert_array_equal(told.sounding, np.tile(world.sounding, (3, 1)))
 
 
 def follow(
