@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from listening import Heard, listen, notes, plan_of, play, scale
+from heard import Heard, listen, notes, plan_of, play, scale
 from pianomime import load_player
 from pianomime.cli import main
 from pianomime.errors import InputError

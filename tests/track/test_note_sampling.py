@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from listening import listen, notes, plan_of, play, scale
+from heard import listen, notes, plan_of, play, scale
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.music import Score

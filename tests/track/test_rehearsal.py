@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from listening import listen, notes, plan_of, play, scale
+from heard import listen, notes, plan_of, play, scale
 from pianomime.errors import InputError
 from pianomime.plan.strikes import Strikes
 from pianomime.track import KeystrokeTracker, RehearsalConfig, RehearsedTracker
