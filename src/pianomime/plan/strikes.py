@@ -38,7 +38,7 @@ class Strikes:
         hand: (M,) 0 left, 1 right.
         finger: (M,) 0 thumb .. 4 little.
         key: (M,) key 0..87.
-        onset: (M,) when the key is to sound [s from the first frame].
+        onset: (M,) when the key is to sound [s from the first frame]; in order.
         release: (M,) when the finger begins to let it go [s].
         velocity: (M,) MIDI velocity of the note, 1 to 127.
         outer: (M,) bool: of the melody or the bass, which an ear follows.
@@ -75,9 +75,10 @@ class Strikes:
 def strikes_of(score: Score, fingering: Fingering) -> Strikes:
     """The strikes of a score, in its own time rather than that of frames.
 
-    A strike is as late as the fingering has it where the hand cannot arrive in time, and its key is
-    let go as early where finger or hand are needed elsewhere; else when the last frame that needs
-    it has ended, so that both frames and notes are right.
+    A note is struck at its onset, but no nearer than 5 ms to the ends of the frame of the onset,
+    and later by whole frames where the fingering has it so because the hand cannot arrive in time.
+    Its key is let go when the last frame that needs it has ended, so that both frames and notes are
+    right; earlier where finger or hand are needed elsewhere, or where it is to sound again.
 
     Args:
         score: the piece.

@@ -91,7 +91,7 @@ class NoteCost:
         self._done: set[int] = set()
 
     def heard(self, strikes: Sequence[Strike]) -> None:
-        """Remember what has sounded for good."""
+        """Remember what has sounded for good; later strikes cannot be those notes again."""
         for strike in strikes:
             wanted = self._wanted(strike, self._done)
             if wanted is not None:
@@ -108,7 +108,9 @@ class NoteCost:
             count: of the frames that count; later ones only show what still comes.
 
         Returns:
-            The cost, and the frames after the first and keys that go wrong, except in frames alone.
+            The cost; and what goes wrong, as frames counted from the first, and keys: notes that
+            are missed, strikes that nobody wanted, and those that are more off than `notice`.
+            Keys that are wrong at the end of a frame, and nothing else, are not among it.
         """
         config, done = self._config, set(self._done)
         end = (first + count) * FRAME_SECONDS

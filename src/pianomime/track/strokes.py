@@ -38,13 +38,14 @@ class StrokeConfig:
     settle: float = 0.03
     """Time for which the finger is over its key before the stroke begins [s]."""
     gap: float = 0.0005
-    """Height over the key at which it then is [m]."""
+    """Height over the key at which it then is, and from which the way down is counted [m]."""
     longest: float = 0.1
     """Longest stroke from its beginning to the sound: that of the softest notes [s]."""
     shortest: float = 0.02
     """Shortest stroke [s]."""
     depth: float = 0.014
-    """Depth below the resting key at which the fingertip aims at the end of the stroke [m]."""
+    """Way of the fingertip from `gap` to where it aims at the end of the stroke, further down than
+    any key goes [m]."""
     mass: float = 0.12
     """Mass of key and finger that the stroke accelerates, at the fingertip [kg]."""
     force: float = 4.0
