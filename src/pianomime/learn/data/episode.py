@@ -141,10 +141,11 @@ def record(controller: Controller, base: Controller, score: Score) -> dict[str, 
 
     observe(0)
     for step in rollout(controller, world, pedal):
-        if step.ctrl.ndim > 1:
+        controls = len(np.atleast_2d(step.ctrl))
+        if controls > 1:
             raise InputError(
-                f"a data set has one control a frame, not {len(step.ctrl)}: collect from a player "
-                "of frames, such as zero-shot-20hz"
+                f"a data set has one control a frame, not {controls}: collect from a player of "
+                "frames, such as zero-shot-20hz"
             )
         columns["action"][step.frame] = step.ctrl
         columns["pressed"][step.frame] = world.pressed
