@@ -1,4 +1,4 @@
-"""World: one simulation of piano and hands, stepped at 20 Hz."""
+"""World: one simulation of piano and hands, stepped by frames of 0.05 s or parts of frames."""
 
 from __future__ import annotations
 
