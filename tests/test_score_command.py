@@ -143,3 +143,13 @@ def test_what_cannot_be_scored_is_one_line(capsys: pytest.CaptureFixture[str]) -
         assert fails(["song.mid", *against, "--seconds", bad], capsys)
         assert fails(["song.mid", *against, "--no-trim", "--seconds", bad], capsys)
     assert fails(["song.mid", *against, "--start", "100"], capsys)
+
+
+@pytest.mark.parametrize("more", [[], ["--no-trim"]])
+def test_playing_nothing_in_time_is_no_error(
+    more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    song().to_midi("song.mid")
+    song(60.0).to_midi("played.mid")
+    row = scored(["played.mid", "--against", "song.mid", *more], capsys)
+    assert (row["music"]["strikes"], row["music"]["note_f1_50"]) == (0, 0.0)

@@ -14,6 +14,7 @@ import made_up
 import pianomime.players.performance
 from pianomime import Performance
 from pianomime.errors import InputError
+from pianomime.music import music_metrics
 from pianomime.plan import FingertipPlan
 
 
@@ -143,3 +144,19 @@ def test_a_plan_of_another_length_is_not_accepted() -> None:
     plan = made_up.plan(made_up.score())
     with pytest.raises(ValueError, match="finger_key"):
         FingertipPlan(plan.fingertips[1:], plan.finger_key, plan.note_hand, plan.note_finger)
+
+
+def test_lifts_of_a_pedal_that_is_the_scores_own_are_not_measured() -> None:
+    score = made_up.score()
+    copied = made_up.performance(score)
+    played = replace(copied, works_pedal=True)
+    assert copied.music().pedal_lifts_kept is None
+    assert played.music() == music_metrics(score, played.played())
+    assert played.music().pedal_lifts_kept is not None
+
+
+@pytest.mark.parametrize("controls", [0, 3, 4])
+def test_a_frame_has_as_many_controls_as_physics_steps_allow(controls: int) -> None:
+    performance = made_up.performance(made_up.score())
+    with pytest.raises(ValueError, match=f"cannot have {controls} controls"):
+        replace(performance, ctrl=np.zeros((len(performance), controls, 46)))

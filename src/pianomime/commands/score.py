@@ -57,7 +57,7 @@ class ScorePlaying:
             OSError: a file cannot be read.
         """
         import json
-        from dataclasses import asdict
+        from dataclasses import asdict, replace
 
         from rich.console import Console
         from rich.table import Table
@@ -67,11 +67,14 @@ class ScorePlaying:
         from pianomime.evaluation.summary import json_of
         from pianomime.music import music_metrics, protocol_digest
 
-        score, played = self._load()
+        score, played, pedalled = self._load()
+        metrics = music_metrics(score, played)
+        if not pedalled:
+            metrics = replace(metrics, pedal_lifts_kept=None)
         row = {
             "song": score.title,
             "protocol": protocol_digest(),
-            "music": json_of(asdict(music_metrics(score, played))),
+            "music": json_of(asdict(metrics)),
         }
         if self.json:
             print(json.dumps(row, indent=2, ensure_ascii=False, allow_nan=False))
@@ -82,8 +85,8 @@ class ScorePlaying:
             table.add_row(Text(measure.label), measure.show(row))
         Console().print(table)
 
-    def _load(self) -> tuple[Score, Score]:
-        """What was to be played, and what was, in one time."""
+    def _load(self) -> tuple[Score, Score, bool]:
+        """What was to be played, and what was, in one time; and whether its pedal was played."""
         from pianomime.errors import InputError
         from pianomime.music import Score, excerpt
         from pianomime.players.performance import Performance
@@ -99,16 +102,28 @@ class ScorePlaying:
                 raise InputError(
                     f"{self.played}: say what was to be played with --against SONG.mid"
                 )
-            return performance.score, performance.played()
+            return performance.score, performance.played(), performance.works_pedal
         song = Score.from_midi(find_song(self.against))
         played = Score.from_midi(self.played) if performance is None else performance.played()
+        pedalled = performance is None or performance.works_pedal
         if not self.trim:
             if self.lead_in is not None:
                 raise InputError("--lead-in: with --no-trim, time runs alike in both files")
             begins, ends = self.start, self.start + self.seconds
-            return song.clip(begins, ends), played.clip(begins, ends)
+            return song.clip(begins, ends), _heard(played, begins, ends), pedalled
         lead_in = 0.0 if self.lead_in is None else self.lead_in
         if self.lead_in is None and performance is not None and len(performance.score):
             lead_in = float(performance.score.onset[0])
         score = excerpt(song, self.start, self.seconds, lead_in)
-        return score, played.clip(0.0, lead_in + self.seconds)
+        return score, _heard(played, 0.0, lead_in + self.seconds), pedalled
+
+
+def _heard(played: Score, begin: float, end: float) -> Score:
+    """What was played between two times [s], which may be nothing."""
+    from dataclasses import replace
+
+    heard = (played.offset > begin) & (played.onset < end)
+    if heard.any():
+        return played.clip(begin, end)
+    nothing = {name: getattr(played, name)[:0] for name in ("key", "onset", "offset", "velocity")}
+    return replace(played, pedal=played.pedal[:0], **nothing)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from pianomime.music import music_metrics, protocol_digest
+from pianomime.music import protocol_digest
 from pianomime.players.body import body_metrics
 from pianomime.players.performance import Performance
 from pianomime.schema import Field, Schema
@@ -122,7 +122,7 @@ def summarize(performance: Performance) -> Row:
         "frames": len(performance),
         "protocol": protocol_digest(),
         "touch": performance.touch,
-        "music": json_of(asdict(music_metrics(performance.score, performance.played()))),
+        "music": json_of(asdict(performance.music())),
         "body": json_of(asdict(body_metrics(performance))),
         **{name: round(value, 6) for name, value in performance.metrics().items()},
         "plan_seconds": round(performance.plan_seconds, 3),

@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from pianomime.archive import holds, read_archive, write_arrays
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, KEYS
-from pianomime.music import Score, frame_metrics, notes_from_roll, onset_f1, pedal_f1
+from pianomime.music import (
+    MusicMetrics,
+    Score,
+    frame_metrics,
+    music_metrics,
+    notes_from_roll,
+    onset_f1,
+    pedal_f1,
+)
 from pianomime.music.score import MAX_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.plan.plan_arrays import (
@@ -30,6 +38,7 @@ from pianomime.plan.plan_arrays import (
 from pianomime.schema import Field
 from pianomime.short_repr import count, short_repr
 from pianomime.world.layout import LAYOUT
+from pianomime.world.parameters import SUBSTEPS
 from pianomime.world.touch import LOUDEST, SOFTEST, TOUCHES
 
 _VERSION = 4
@@ -127,6 +136,10 @@ class Performance:
                 wanted = (frames, shape[1] if len(shape) == 3 else 1, LAYOUT.ctrl_size)
             if name != "blow_ups" and shape != wanted:
                 raise ValueError(f"{name} has shape {shape}, not {wanted}")
+        if not self.ctrl.shape[1] or SUBSTEPS % self.ctrl.shape[1]:
+            raise ValueError(
+                f"a frame of {SUBSTEPS} physics steps cannot have {self.ctrl.shape[1]} controls"
+            )
         if self.touch not in TOUCHES:
             raise ValueError(f"there is no touch {self.touch!r}; there are {', '.join(TOUCHES)}")
         if not (self.event_on < self.event_off).all():
@@ -185,6 +198,14 @@ class Performance:
             pedal=self.pedal_times,
             title=self.score.title,
         )
+
+    def music(self) -> MusicMetrics:
+        """How well it was played by the music protocol.
+
+        Lifts of the pedal are not measured where the player does not work it: they are the score's.
+        """
+        metrics = music_metrics(self.score, self.played())
+        return metrics if self.works_pedal else replace(metrics, pedal_lifts_kept=None)
 
     def metrics(self) -> dict[str, float]:
         """How well it was played, each 0..1.

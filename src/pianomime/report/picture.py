@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from pianomime.evaluation.measures import MUSIC
-from pianomime.music import Score, match_notes, music_metrics
+from pianomime.music import Score, match_notes
 from pianomime.music.key_time import strikes
 from pianomime.palette import LIGHT, Theme
 from pianomime.plan import LEFT, RIGHT
@@ -38,7 +38,7 @@ def draw(performance: Performance, path: str | os.PathLike[str], theme: Theme = 
         theme: the colours.
     """
     lines = Lines.of(performance)
-    row = {"music": asdict(music_metrics(performance.score, performance.played()))}
+    row = {"music": asdict(performance.music())}
     remark = "    ".join(f"{measure.label}: {measure.show(row)}" for measure in _REMARK)
     figure = sheet(_HEAD + lines.height, performance.score.title, remark, theme)
     legend(figure, _entries(performance, theme), theme)
