@@ -21,7 +21,7 @@ from pianomime.evaluation.summary import (
     summarize,
 )
 from pianomime.evaluation.table import markdown
-from pianomime.music import MusicMetrics, Score, music_metrics, protocol_digest
+from pianomime.music import MusicMetrics, Score, protocol_digest
 from pianomime.players.body import BodyMetrics, body_metrics
 from pianomime.schema import check_json
 
