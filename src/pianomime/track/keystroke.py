@@ -130,10 +130,11 @@ class KeystrokeController:
         self._x = plan.fingertips[frame, strikes.hand, 1 + strikes.finger, 0]
         hinge = key_centres()[strikes.key, 0] - key_half_sizes()[strikes.key, 0]
         self._reach = self._x - hinge
+        self._strike_with(Corrections.none(len(strikes)))
         steps = Steps("paths", len(hands) * config.path.iterations * len(plan))
         self._paths = [self._coarse_path(index, steps) for index in range(len(hands))]
         steps = Steps("controls", self._steps(config.refine))
-        self._aim(Corrections.none(len(strikes)), config.refine, steps.advance)
+        self._aim(config.refine, steps.advance)
 
     @property
     def controls_per_frame(self) -> int:
@@ -152,19 +153,26 @@ class KeystrokeController:
             corrections: of the strikes.
             advance: called with a number of steps as they are done, `correction_steps` in all.
         """
-        self._aim(corrections, self.config.again, advance)
+        self._strike_with(corrections)
+        self._aim(self.config.again, advance)
 
     def _steps(self, iterations: int) -> int:
         return len(self._hands) * (iterations + 2) * len(self._times)
 
-    def _aim(
-        self, corrections: Corrections, iterations: int, advance: Callable[[int], None]
-    ) -> None:
-        """Compute paths, in so many Gauss-Newton steps from those there are, and controls."""
+    def _strike_with(self, corrections: Corrections) -> None:
+        """Compute the strokes of corrected strikes."""
         self.corrections = corrections
         self._strokes = strokes_of(
             self.strikes, corrections, self._reach, self._times, self.config.stroke
         )
+
+    def _aim(self, iterations: int, advance: Callable[[int], None]) -> None:
+        """Compute paths of the strokes, in Gauss-Newton steps from those there are, and controls.
+
+        Args:
+            iterations: number of Gauss-Newton steps.
+            advance: called with a number of steps as they are done.
+        """
         count = len(self._times)
         self._feedforward = np.empty((count, LAYOUT.ctrl_size))
         self._press = np.zeros((count, 2, FINGER_COUNT, LAYOUT.hand_actuators))
@@ -239,13 +247,6 @@ class KeystrokeController:
     def _coarse_path(self, index: int, steps: Steps) -> NDArray[np.float64]:
         """(n + 1, 27) The path to begin with: one of frames, straight between them."""
         hand, frames = self._hands[index], len(self.plan)
-        self._strokes = strokes_of(
-            self.strikes,
-            Corrections.none(len(self.strikes)),
-            self._reach,
-            self._times,
-            self.config.stroke,
-        )
         targets, weights = self._targets(index)
         ends = slice(self.config.controls - 1, None, self.config.controls)
         path = smooth_path(
