@@ -29,6 +29,7 @@ from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
+from pianomime.world_names import PAPER
 
 _WINDOW = 1000
 """Frames whose torques are in memory for every finger."""
@@ -72,11 +73,12 @@ class DynamicTracker:
 
     Args:
         config: its settings; those of `zero-shot-20hz` if None.
+        world: name of the world in which it moves hands.
     """
 
-    def __init__(self, config: DynamicConfig | None = None) -> None:
+    def __init__(self, config: DynamicConfig | None = None, world: str = PAPER) -> None:
         self.config = config or DynamicConfig()
-        self._hands = [Hand(side) for side in SIDES]
+        self._hands = [Hand(side, world) for side in SIDES]
 
     def start(self, plan: FingertipPlan) -> DynamicController:
         """A controller with joint paths and the feed-forward controls that follow them."""

@@ -29,6 +29,7 @@ from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import SUBSTEPS, key_centres, key_half_sizes
+from pianomime.world_names import PAPER
 
 # Errors of the path at which their cost is 1 [m].
 _WRIST_TOLERANCE = 0.05  # along the keyboard; the others do not count
@@ -80,11 +81,12 @@ class KeystrokeTracker:
 
     Args:
         config: its settings; those of the zero-shot player if None.
+        world: name of the world in which it moves hands.
     """
 
-    def __init__(self, config: KeystrokeConfig | None = None) -> None:
+    def __init__(self, config: KeystrokeConfig | None = None, world: str = PAPER) -> None:
         self.config = config or KeystrokeConfig()
-        self._hands = [Hand(side) for side in SIDES]
+        self._hands = [Hand(side, world) for side in SIDES]
 
     def start(self, plan: FingertipPlan) -> KeystrokeController:
         """A controller with paths and the feed-forward controls that follow them.
@@ -135,6 +137,11 @@ class KeystrokeController:
         self._paths = [self._coarse_path(index, steps) for index in range(len(hands))]
         steps = Steps("controls", self._steps(config.refine))
         self._aim(config.refine, steps.advance)
+
+    @property
+    def world(self) -> str:
+        """Name of the world in which it moves hands."""
+        return self._hands[0].world
 
     @property
     def controls_per_frame(self) -> int:

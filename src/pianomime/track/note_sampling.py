@@ -124,7 +124,7 @@ class NoteSamplingController:
         wanted = replace(base.strikes, velocity=stroke.velocities(base.strikes))
         self._cost = NoteCost(wanted, self._goal, TOUCHES[stroke.touch], config.cost)
         self._variations = Variations(base.plan, config)
-        self._batch = WorldBatch(config.variations, threads, quiet=True)
+        self._batch = WorldBatch(config.variations, threads, quiet=True, model=base.world)
         self._chosen: list[_Step] = []
         self._known: list[_Step] = []
         self._ahead: World | None = None

@@ -20,6 +20,7 @@ from pianomime.track.tracker import Tracker
 from pianomime.track.variations import VariationConfig, Variations
 from pianomime.validation import within
 from pianomime.world import World, WorldBatch
+from pianomime.world_names import PAPER
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,7 @@ class PredictiveSamplingTracker:
         config: the sampling budget.
         goal: (T, 88) bool, the keys that should be down; those that the plan presses if None.
         threads: how many variations step at the same time; 0 for one on each core.
+        world: name of the world in which variations are tried.
     """
 
     def __init__(
@@ -64,9 +66,11 @@ class PredictiveSamplingTracker:
         config: PredictiveSamplingConfig | None = None,
         goal: NDArray[np.bool_] | None = None,
         threads: int = 0,
+        world: str = PAPER,
     ) -> None:
         self.config = config or PredictiveSamplingConfig()
         self._tracker, self._goal, self._threads = tracker, goal, threads
+        self._world = world
 
     def start(self, plan: FingertipPlan) -> PredictiveSamplingController:
         """A controller; for the same plan it draws the same variations.
@@ -77,7 +81,7 @@ class PredictiveSamplingTracker:
         """
         goal = plan.keys() if self._goal is None else self._goal
         return PredictiveSamplingController(
-            self._tracker.start(plan), self.config, goal, self._threads
+            self._tracker.start(plan), self.config, goal, self._threads, self._world
         )
 
 
@@ -94,6 +98,7 @@ class PredictiveSamplingController:
         config: the sampling budget.
         goal: (T, 88) bool, the keys that should be down.
         threads: how many variations step at the same time; 0 for one on each core.
+        world: name of the world in which variations are tried.
 
     Raises:
         InputError: `base` is not replayable, has no plan, or gives several controls a frame.
@@ -107,6 +112,7 @@ class PredictiveSamplingController:
         config: PredictiveSamplingConfig,
         goal: NDArray[np.bool_],
         threads: int = 0,
+        world: str = PAPER,
     ) -> None:
         if not base.replayable:
             raise InputError(
@@ -124,7 +130,7 @@ class PredictiveSamplingController:
         self.plan = base.plan
         self.steps = 0
         self._base, self._goal = base, goal
-        self._batch = WorldBatch(config.variations, threads, quiet=True)
+        self._batch = WorldBatch(config.variations, threads, quiet=True, model=world)
         self._variations = Variations(self.plan, config)
         self._ctrl: list[NDArray[np.float64]] = []
 

@@ -131,7 +131,7 @@ def corrected(
 
 def _listen(controller: KeystrokeController, steps: Steps) -> list[Strike]:
     """All that sounds when a controller plays in a world of its own."""
-    world, heard = World(quiet=True), []
+    world, heard = World(controller.world, quiet=True), []
     parts = controller.controls_per_frame
     for frame in range(len(controller.plan)):
         for part in range(parts):

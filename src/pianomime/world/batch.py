@@ -26,6 +26,7 @@ from pianomime.world.state import (
     reset_pose_after_instability,
     starting_positions,
 )
+from pianomime.world_names import PAPER
 
 _RECORDED = ("qpos", "qvel")
 _NUMBER = 1  # Batch.warning holds (last info, number of warnings) of each kind.
@@ -43,20 +44,28 @@ class WorldBatch(WorldState):
             physics became unstable; it is then recovered as a `World` is.
     """
 
-    def __init__(self, worlds: int, threads: int = 0, quiet: bool = False) -> None:
+    def __init__(
+        self,
+        worlds: int,
+        threads: int = 0,
+        quiet: bool = False,
+        model: str | mujoco.MjModel = PAPER,
+    ) -> None:
         """Make worlds at rest.
 
         Args:
             worlds: number of worlds, B.
             threads: number of threads that step them; 0 for one per core.
             quiet: do not warn when the physics becomes unstable.
+            model: name of the world, or its model, as of `world_model`.
 
         Raises:
+            InputError: there is no such world.
             ValueError: there are no worlds, or a negative number of threads.
         """
         if worlds < 1 or threads < 0:
             raise ValueError(f"cannot make {worlds} worlds on {threads} threads")
-        self.model = world_model()
+        self.model = world_model(model)
         self.quiet = quiet
         # Which bodies sleep is not part of MuJoCo's state, so each world keeps its own data.
         self._batch = Batch(self.model, worlds, threads, persistent=True)

@@ -10,13 +10,19 @@ from numpy.typing import NDArray
 
 from pianomime.world.layout import LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES, Side, fingertip_sites, hand_model
+from pianomime.world_names import PAPER
 
 
 class Hand:
     """The kinematics of one hand.
 
+    Args:
+        side: "lh" or "rh".
+        world: name of the world that the hand is of.
+
     Attributes:
         side: "lh" or "rh".
+        world: name of the world that it is of.
         model: MuJoCo model of the hand alone; read-only.
         data: its MuJoCo state, in the pose that was last asked for.
         low, high: (27,) joint limits [rad, m].
@@ -28,9 +34,9 @@ class Hand:
         actuators: slice of this hand's actuators in the controls (46,) of a World.
     """
 
-    def __init__(self, side: Side) -> None:
-        self.side = side
-        self.model = hand_model(side)
+    def __init__(self, side: Side, world: str = PAPER) -> None:
+        self.side, self.world = side, world
+        self.model = hand_model(side, world)
         self.data = mujoco.MjData(self.model)
         self.low, self.high = self.model.jnt_range.T.copy()
         self.ctrl_low, self.ctrl_high = self.model.actuator_ctrlrange.T.copy()

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import mujoco
 import numpy as np
 
+from pianomime.errors import unknown_name
 from pianomime.keyboard import BLACK, KEYS
 from pianomime.world.parameters import (
     PARAMETERS,
@@ -20,6 +21,7 @@ from pianomime.world.parameters import (
     key_centres,
     key_half_sizes,
 )
+from pianomime.world_names import PAPER, WORLDS
 
 Side = Literal["rh", "lh"]
 
@@ -44,9 +46,16 @@ _FOREARM_BASE = {"rh": (0.4, 0.15, 0.13), "lh": (0.4, -0.15, 0.13)}
 _FOREARM_QUAT = (-0.5, -0.5, 0.5, 0.5)
 
 
-def build_spec() -> mujoco.MjSpec:
-    """The spec of piano and both hands, with plain colours; `scene_look.dress` adds the looks."""
-    spec = _empty_spec()
+def build_spec(world: str = PAPER) -> mujoco.MjSpec:
+    """The spec of piano and both hands, with plain colours; `scene_look.dress` adds the looks.
+
+    Args:
+        world: its name, one of `WORLDS`, which the compiled model bears.
+
+    Raises:
+        InputError: there is no such world.
+    """
+    spec = _empty_spec(world)
     add_piano(spec)
     add_hand(spec, "rh")
     add_hand(spec, "lh")
@@ -54,32 +63,54 @@ def build_spec() -> mujoco.MjSpec:
 
 
 def hands_spec() -> mujoco.MjSpec:
-    """The spec of both hands without the piano, in the order of `build_spec`."""
-    spec = _empty_spec()
+    """The spec of both hands of the paper's world alone, in the order of `build_spec`."""
+    spec = _empty_spec(PAPER)
     add_hand(spec, "rh")
     add_hand(spec, "lh")
     return spec
 
 
+def world_model(world: str | mujoco.MjModel = PAPER) -> mujoco.MjModel:
+    """The compiled model of a world.
+
+    Args:
+        world: its name, one of `WORLDS`; compiled once, to be treated as read-only. Or a model,
+            such as a copy of one of these with other parameters, which is returned as it is.
+
+    Raises:
+        InputError: there is no such world.
+    """
+    return _compiled(world) if isinstance(world, str) else world
+
+
+def name_of(model: mujoco.MjModel) -> str:
+    """The name of the world that a model is of; copies keep it."""
+    name: str = model.names[: model.names.index(b"\0")].decode()
+    return name
+
+
 @cache
-def world_model() -> mujoco.MjModel:
-    """The compiled model of `build_spec`, compiled once; treat it as read-only."""
+def _compiled(world: str) -> mujoco.MjModel:
     # World itself reports broken physics; without this MuJoCo writes MUJOCO_LOG.TXT where it runs.
     log = mujoco.MjLogConfig.get()
     log.logto_file = False
     log.logto_console = False
     log.set()
-    return build_spec().compile()
+    return build_spec(world).compile()
 
 
 @cache
-def hand_model(side: Side) -> mujoco.MjModel:
+def hand_model(side: Side, world: str = PAPER) -> mujoco.MjModel:
     """The compiled model of one hand without the piano, for kinematics and inverse dynamics.
 
     Args:
         side: "lh" or "rh". The model is compiled once; treat it as read-only.
+        world: name of the world that the hand is of; worlds differ in the dynamics alone.
+
+    Raises:
+        InputError: there is no such world.
     """
-    spec = _empty_spec()
+    spec = _empty_spec(world)
     add_hand(spec, side)
     return spec.compile()
 
@@ -182,8 +213,11 @@ def fingertip_sites(side: Side) -> list[str]:
     return [f"{side}_wrist", *(f"{side}_{finger}_tip" for finger in FINGER_PREFIXES)]
 
 
-def _empty_spec() -> mujoco.MjSpec:
+def _empty_spec(world: str) -> mujoco.MjSpec:
+    if world not in WORLDS:
+        raise unknown_name("world", world, WORLDS)
     spec = mujoco.MjSpec()
+    spec.modelname = world
     physics = PARAMETERS["physics"]
     spec.option.timestep = PHYSICS_DT
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pianomime.keyboard import KEYS
 from pianomime.world.key_sensor import NOTHING, sense, silenced
-from pianomime.world.model import SIDES, fingertip_sites, world_model
+from pianomime.world.model import SIDES, fingertip_sites, name_of, world_model
 from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS
 from pianomime.world.state import (
     BLOW_UP,
@@ -25,6 +25,7 @@ from pianomime.world.state import (
     reset_pose_after_instability,
     starting_positions,
 )
+from pianomime.world_names import PAPER
 
 
 class World(WorldState):
@@ -44,14 +45,18 @@ class World(WorldState):
         quiet: whether unstable physics raises no `PhysicsWarning`.
     """
 
-    def __init__(self, quiet: bool = False) -> None:
+    def __init__(self, model: str | mujoco.MjModel = PAPER, quiet: bool = False) -> None:
         """Make a world at rest.
 
         Args:
+            model: name of the world, or its model, as of `world_model`.
             quiet: do not warn when the physics becomes unstable, as for look-ahead copies.
+
+        Raises:
+            InputError: there is no such world.
         """
         self.quiet = quiet
-        self.model = world_model()
+        self.model = world_model(model)
         self.data = mujoco.MjData(self.model)
         self._tips = np.array(
             [[self.model.site(name).id for name in fingertip_sites(side)] for side in SIDES]
@@ -166,17 +171,22 @@ class World(WorldState):
         self._listen()
 
     def copy(self, quiet: bool = False) -> World:
-        """A world in the same state, which continues as this one does, bit for bit.
+        """A world of the same model in the same state, which continues as this one, bit for bit.
 
         Args:
             quiet: as of a new world.
         """
-        other = World(quiet)
+        other = World(self.model, quiet)
         mujoco.mj_copyData(other.data, self.model, self.data)
         other.blow_ups, other.pedal = self.blow_ups, self.pedal
         other._substep = self._substep
         other.sounding, other.key_events = self.sounding.copy(), self.key_events
         return other
+
+    @property
+    def name(self) -> str:
+        """Name of the world that its model is of, one of `WORLDS`."""
+        return name_of(self.model)
 
     @property
     def fingertips(self) -> NDArray[np.float64]:

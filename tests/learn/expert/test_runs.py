@@ -168,9 +168,9 @@ def test_a_search_has_the_threads_that_it_is_given(
 ) -> None:
     asked: set[int] = set()
 
-    def recorded(worlds: int, threads: int = 0, quiet: bool = False) -> WorldBatch:
+    def recorded(worlds: int, threads: int, **others: Any) -> WorldBatch:
         asked.add(threads)
-        return WorldBatch(worlds, threads, quiet)
+        return WorldBatch(worlds, threads, **others)
 
     monkeypatch.setattr("pianomime.track.predictive_sampling.WorldBatch", recorded)
     one = train_expert(demo, tmp_path / "one", small_search, threads=1)
