@@ -12,6 +12,7 @@ from pianomime.plan.joint_path import (
     BLACK_REST,
     HOME,
     WHITE_REST,
+    PathProblem,
     resting_height,
     smooth_path,
 )
@@ -42,7 +43,7 @@ def test_home_is_within_the_limits(side: str) -> None:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_begins_where_it_is_told(side: str) -> None:
-    path = smooth_path(HANDS[side], REST, *no_targets(10))
+    path = smooth_path(PathProblem(HANDS[side], REST, *no_targets(10)))
     assert path.shape == (11, JOINTS)
     np.testing.assert_array_equal(path[0], REST)
 
@@ -55,7 +56,7 @@ def test_stays_within_the_limits_whatever_is_wished(side: str, seed: int, frames
     targets = draw.uniform([-0.5, -1.0, -0.2], [0.5, 1.0, 0.5], (frames, 6, 3))
     weights = draw.choice([0.0, 100.0, 1000.0], (frames, 6, 3))
     clearance = draw.choice([np.nan, 0.0, 0.05], (frames, 5))
-    path = smooth_path(hand, REST, targets, weights, clearance)
+    path = smooth_path(PathProblem(hand, REST, targets, weights, clearance))
     assert path.shape == (frames + 1, JOINTS)
     assert np.isfinite(path).all()
     assert ((hand.low <= path[1:]) & (path[1:] <= hand.high)).all()
@@ -63,7 +64,7 @@ def test_stays_within_the_limits_whatever_is_wished(side: str, seed: int, frames
 
 @pytest.mark.parametrize("side", SIDES)
 def test_a_single_frame(side: str) -> None:
-    path = smooth_path(HANDS[side], REST, *no_targets(1))
+    path = smooth_path(PathProblem(HANDS[side], REST, *no_targets(1)))
     assert path.shape == (2, JOINTS)
     assert np.isfinite(path).all()
 
@@ -77,7 +78,7 @@ def test_hits_targets_on_time(side: str) -> None:
     for frame, shift in ((25, 0.1), (26, 0.1), (50, 0.0), (51, 0.0)):
         targets[frame, 2] = at_home[2] + [0.0, shift, -0.01]
         weights[frame, 2] = 1 / 0.001
-    path = smooth_path(hand, REST, targets, weights, clearance)
+    path = smooth_path(PathProblem(hand, REST, targets, weights, clearance))
     for frame in (25, 26, 50, 51):
         tip = hand.points(path[frame + 1])[2]
         assert np.linalg.norm(tip - targets[frame, 2]) < 1e-3
@@ -92,7 +93,7 @@ def test_moves_smoothly(side: str) -> None:
     for frame, shift in ((20, -0.1), (40, 0.1)):
         targets[frame, 1:, 1] = along + shift
         weights[frame, 1:, 1] = 1 / 0.002
-    path = smooth_path(hand, REST, targets, weights, clearance)
+    path = smooth_path(PathProblem(hand, REST, targets, weights, clearance))
     acceleration = np.diff(path[:, 0], n=2) / 0.05**2
     assert np.abs(acceleration).max() < 20.0
     speed = np.abs(np.diff(path[20:42, 0])) / 0.05
@@ -109,7 +110,7 @@ def test_idle_fingertips_keep_clear_of_the_keys(side: str, clear: float) -> None
     clearance[15:20, 2] = np.nan
     targets[15:20, 3] = [0.04, hand.points(HOME)[3, 1], WHITE_REST - 0.009]
     weights[15:20, 3] = 1 / 0.001
-    path = smooth_path(hand, REST, targets, weights, clearance)
+    path = smooth_path(PathProblem(hand, REST, targets, weights, clearance))
     points = np.array([hand.points(pose)[1:] for pose in path[5:]])
     idle = np.array([0, 1, 3, 4])
     above = points[:, idle, 2] - resting_height(points[:, idle, 0])

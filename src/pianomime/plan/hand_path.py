@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import BLACK, NO_KEY
 from pianomime.plan.fingertip_plan import FingertipPlan
-from pianomime.plan.joint_path import KEY_REST, PathConfig, smooth_path
+from pianomime.plan.joint_path import KEY_REST, PathConfig, PathProblem
+from pianomime.plan.keep_apart import smooth_paths
 from pianomime.progress import Steps
 from pianomime.validation import above_zero, finite
 from pianomime.world.hand import Hand
@@ -77,10 +78,9 @@ def hand_paths(
         (T, 2, 6, 3) points, world frame [m]; z is 0 for fingers that press.
     """
     config = config or HandPathConfig()
-    fingertips = np.empty((len(finger_key), 2, POINT_COUNT, 3))
     steps = Steps("hand paths", len(SIDES) * config.path.iterations * len(finger_key))
+    problems = []
     for index, side in enumerate(SIDES):
-        hand = Hand(side)
         targets, weights, clearance = _targets(finger_key[:, index], config)
         if others is not None:
             idle = (weights == 0).all(axis=2)
@@ -89,17 +89,12 @@ def hand_paths(
             weights[idle, :2] = 1 / config.alike
             targets[:, 0] = others[:, index, 0]
             weights[:, 0, 1] = 1 / config.alike_wrist
-        path = smooth_path(
-            hand,
-            np.zeros(LAYOUT.hand_joints),
-            targets,
-            weights,
-            clearance,
-            config.path,
-            steps.advance,
-        )
+        start = np.zeros(LAYOUT.hand_joints)
+        problems.append(PathProblem(Hand(side), start, targets, weights, clearance, config.path))
+    fingertips = np.empty((len(finger_key), 2, POINT_COUNT, 3))
+    for index, path in enumerate(smooth_paths(problems, steps.advance)):
         for frame, pose in enumerate(path[1:]):
-            fingertips[frame, index] = hand.points(pose)
+            fingertips[frame, index] = problems[index].hand.points(pose)
         fingertips[:, index, 1:, 2][finger_key[:, index] >= 0] = 0.0
     return fingertips
 

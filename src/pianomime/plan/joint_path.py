@@ -10,7 +10,8 @@ linearly with the length of the piece. So does the memory, but only by the lower
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import BLACK, FRAME_SECONDS
 from pianomime.plan.band_solve import solve_in_windows
 from pianomime.progress import ignore
-from pianomime.validation import above_zero, whole_numbers
+from pianomime.validation import above_zero, whole_numbers, within
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import key_centres, key_half_sizes
@@ -86,27 +87,40 @@ class PathConfig:
     """Largest displacement of a joint in one Gauss-Newton step [rad, m]."""
     iterations: int = 10
     """Number of Gauss-Newton steps."""
+    apart: float = 0.0
+    """Distance that fingers, and hands, keep from each other [m]; 0 where they pass through each
+    other, as in the paper's world."""
+    near: float = 0.001
+    """Shortfall of that distance [m]."""
 
     def __post_init__(self) -> None:
         whole_numbers(self)
         for name, value in vars(self).items():
-            above_zero(name, value)
+            if name == "apart":
+                within(name, value, 0.0)
+            else:
+                above_zero(name, value)
 
 
-def smooth_path(
-    hand: Hand,
-    start: NDArray[np.float64],
-    targets: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    clearance: NDArray[np.float64],
-    config: PathConfig | None = None,
-    advance: Callable[[int], None] = ignore,
-    dt: float = FRAME_SECONDS,
-    guess: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
-    """Optimise the joint positions of one hand at the end of each of T frames.
+class Rows(NamedTuple):
+    """C more residuals of the path of a hand: r of them are to be small.
 
-    Args:
+    Attributes:
+        frame: (C,) in which each counts.
+        residual: (C,) its value there.
+        gradient: (C, 27) by the joints [1/rad, 1/m].
+    """
+
+    frame: NDArray[np.int64]
+    residual: NDArray[np.float64]
+    gradient: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PathProblem:
+    """What the path of one hand over T frames is to be.
+
+    Attributes:
         hand: the hand that moves.
         start: (27,) joint positions before the first frame, where the hand is at rest [rad, m].
         targets: (T, 6, 3) target positions of wrist and fingertips at the end of each frame,
@@ -115,45 +129,101 @@ def smooth_path(
         clearance: (T, 5) least height of each fingertip above the keys [m]; NaN for fingers
             that may go down.
         config: weights of the other terms.
-        advance: called with a number of frames as they are done, `iterations` times T in all.
         dt: length of a frame [s]. Tracking errors are as given; all other terms count for the time
             that they last, so that a path of shorter frames is the same path.
-        guess: (T, 27) path to begin with [rad, m]; None for the home pose along the targets.
-
-    Returns:
-        (T + 1, 27) joint positions [rad, m]; the first row is `start`.
     """
-    config = config or PathConfig()
-    frames = len(targets)
-    lasts = dt / FRAME_SECONDS
-    posture = _posture_weights(config) * lasts
-    coupling = _coupling_hessian(config) * lasts
-    stiffness = _acceleration_weights(config, dt) * lasts
-    home = np.clip(HOME, hand.low, hand.high)
-    if guess is None:
-        path = np.tile(home, (frames, 1))
-        path[:, LAYOUT.slide] = _slide_guess(hand, targets, weights)
-    else:
-        path = np.clip(guess, hand.low, hand.high)
-    everywhere = np.diag(posture + config.damping**-2 * lasts) + coupling
-    blocks = np.empty((frames, len(_STORED)))
-    for _ in range(config.iterations):
+
+    hand: Hand
+    start: NDArray[np.float64]
+    targets: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    clearance: NDArray[np.float64]
+    config: PathConfig = field(default_factory=PathConfig)
+    dt: float = FRAME_SECONDS
+
+    @property
+    def lasts(self) -> float:
+        """Length of a frame, as a share of 0.05 s."""
+        return self.dt / FRAME_SECONDS
+
+    def begin(self, guess: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        """(T, 27) A path to begin with [rad, m].
+
+        Args:
+            guess: (T, 27) such a path; None for the home pose along the targets.
+        """
+        hand = self.hand
+        if guess is not None:
+            return np.clip(guess, hand.low, hand.high)
+        path = np.tile(np.clip(HOME, hand.low, hand.high), (len(self.targets), 1))
+        path[:, LAYOUT.slide] = _slide_guess(hand, self.targets, self.weights)
+        return path
+
+    def improve(
+        self,
+        path: NDArray[np.float64],
+        rows: Rows | None = None,
+        advance: Callable[[int], None] = ignore,
+    ) -> NDArray[np.float64]:
+        """(T, 27) The path after one Gauss-Newton step [rad, m].
+
+        Args:
+            path: (T, 27) before it.
+            rows: residuals that count in addition.
+            advance: called with a number of frames as they are done, T in all.
+        """
+        hand, config, frames = self.hand, self.config, len(path)
+        posture = _posture_weights(config) * self.lasts
+        coupling = _coupling_hessian(config) * self.lasts
+        stiffness = _acceleration_weights(config, self.dt) * self.lasts
+        home = np.clip(HOME, hand.low, hand.high)
+        everywhere = np.diag(posture + config.damping**-2 * self.lasts) + coupling
+        blocks = np.empty((frames, len(_STORED)))
         gradient = np.empty((frames, LAYOUT.hand_joints))
         for first in range(0, frames, _WINDOW):
             here = slice(first, min(first + _WINDOW, frames))
             whole, gradient[here] = _tracking_terms(
-                hand, path[here], targets[here], weights[here], clearance[here], config
+                hand,
+                path[here],
+                self.targets[here],
+                self.weights[here],
+                self.clearance[here],
+                config,
             )
             whole += everywhere
             blocks[here] = whole.reshape(len(whole), -1)[:, _STORED]
             advance(len(whole))
         gradient += posture * (path - home) + path @ coupling
+        if rows is not None:
+            squares = rows.gradient[:, :, None] * rows.gradient[:, None]
+            np.add.at(blocks, rows.frame, squares.reshape(len(squares), -1)[:, _STORED])
+            np.add.at(gradient, rows.frame, rows.residual[:, None] * rows.gradient)
         # A joint that is pushed against its limit stays there for this step.
         held = ((path <= hand.low) & (gradient > 0)) | ((path >= hand.high) & (gradient < 0))
         blocks[:, _LINES[0]] += held * _HELD
-        step = _step(blocks, gradient, stiffness, path, start)
-        path = np.clip(path + np.clip(step, -config.step, config.step), hand.low, hand.high)
-    return np.vstack([start, path])
+        step = _step(blocks, gradient, stiffness, path, self.start)
+        return np.clip(path + np.clip(step, -config.step, config.step), hand.low, hand.high)
+
+
+def smooth_path(
+    problem: PathProblem,
+    advance: Callable[[int], None] = ignore,
+    guess: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
+    """Optimise the joint positions of one hand at the end of each of T frames.
+
+    Args:
+        problem: the hand, and where it is to go.
+        advance: called with a number of frames as they are done, `iterations` times T in all.
+        guess: (T, 27) path to begin with [rad, m]; None for the home pose along the targets.
+
+    Returns:
+        (T + 1, 27) joint positions [rad, m]; the first row is where the hand starts.
+    """
+    path = problem.begin(guess)
+    for _ in range(problem.config.iterations):
+        path = problem.improve(path, advance=advance)
+    return np.vstack([problem.start, path])
 
 
 def _tracking_terms(

@@ -18,6 +18,7 @@ from pianomime.plan import FingertipPlan
 from pianomime.plan.joint_path import (
     KEY_REST,
     PathConfig,
+    PathProblem,
     resting_height,
     smooth_path,
 )
@@ -110,7 +111,8 @@ class DynamicController:
             targets, weights = self._targets(plan.fingertips[:, index], plan.finger_key[:, index])
             clearance = np.full(pressing.shape, np.nan)
             start = np.zeros(LAYOUT.hand_joints)
-            path = smooth_path(hand, start, targets, weights, clearance, config.path, steps.advance)
+            problem = PathProblem(hand, start, targets, weights, clearance, config.path)
+            path = smooth_path(problem, steps.advance)
             self._paths.append(path)
             tips = np.empty((len(path), FINGER_COUNT, 3))
             for frame, pose in enumerate(path):

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
-from pianomime.plan.joint_path import KEY_REST, PathConfig, resting_height, smooth_path
+from pianomime.plan.joint_path import KEY_REST, PathConfig, PathProblem, resting_height
+from pianomime.plan.keep_apart import smooth_paths
 from pianomime.plan.strikes import Strikes
 from pianomime.progress import Steps, ignore
 from pianomime.track.dynamic import motion_torque, to_actuators
@@ -134,7 +135,7 @@ class KeystrokeController:
         self._reach = self._x - hinge
         self._strike_with(Corrections.none(len(strikes)))
         steps = Steps("paths", len(hands) * config.path.iterations * len(plan))
-        self._paths = [self._coarse_path(index, steps) for index in range(len(hands))]
+        self._paths = self._coarse_paths(steps)
         steps = Steps("controls", self._steps(config.refine))
         self._aim(config.refine, steps.advance)
 
@@ -187,22 +188,14 @@ class KeystrokeController:
         config = replace(self.config.path, iterations=iterations)
         # An idle finger counts for the time for which it is idle, a stroke for each of its points.
         share = 1.0 / np.sqrt(self.config.controls)
-        for index, hand in enumerate(self._hands):
+        problems = []
+        for index in range(len(self._hands)):
             targets, weights = self._targets(index)
             weights *= share
             weights[:, 1:][self._strokes.tight[:, index]] /= share
-            path = smooth_path(
-                hand,
-                np.zeros(LAYOUT.hand_joints),
-                targets,
-                weights,
-                np.full((count, FINGER_COUNT), np.nan),
-                config,
-                advance,
-                self._dt,
-                self._paths[index][1:],
-            )
-            self._paths[index] = path
+            problems.append(self._problem(index, targets, weights, config, self._dt))
+        self._paths = smooth_paths(problems, advance, [path[1:] for path in self._paths])
+        for index, (hand, path) in enumerate(zip(self._hands, self._paths, strict=True)):
             self._follow(index, hand, path)
             advance(count)
             torque = to_actuators(hand, motion_torque(hand, path, self._dt)) / hand.gain
@@ -251,23 +244,32 @@ class KeystrokeController:
         """[s] Length of a control."""
         return FRAME_SECONDS / self.config.controls
 
-    def _coarse_path(self, index: int, steps: Steps) -> NDArray[np.float64]:
-        """(n + 1, 27) The path to begin with: one of frames, straight between them."""
-        hand, frames = self._hands[index], len(self.plan)
-        targets, weights = self._targets(index)
+    def _problem(
+        self,
+        index: int,
+        targets: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        config: PathConfig,
+        dt: float,
+    ) -> PathProblem:
+        """What the path of one hand is to be, from rest."""
+        start = np.zeros(LAYOUT.hand_joints)
+        clearance = np.full((len(targets), FINGER_COUNT), np.nan)
+        return PathProblem(self._hands[index], start, targets, weights, clearance, config, dt)
+
+    def _coarse_paths(self, steps: Steps) -> list[NDArray[np.float64]]:
+        """(n + 1, 27) for each hand, to begin with: those of frames, straight between them."""
         ends = slice(self.config.controls - 1, None, self.config.controls)
-        path = smooth_path(
-            hand,
-            np.zeros(LAYOUT.hand_joints),
-            targets[ends],
-            weights[ends],
-            np.full((frames, FINGER_COUNT), np.nan),
-            self.config.path,
-            steps.advance,
-        )
-        at = np.arange(frames + 1) * FRAME_SECONDS
-        fine = [np.interp(np.append(0.0, self._times), at, joint) for joint in path.T]
-        return np.stack(fine, axis=1)
+        problems = []
+        for index in range(len(self._hands)):
+            targets, weights = (array[ends] for array in self._targets(index))
+            problems.append(self._problem(index, targets, weights, self.config.path, FRAME_SECONDS))
+        at = np.arange(len(self.plan) + 1) * FRAME_SECONDS
+        times = np.append(0.0, self._times)
+        return [
+            np.stack([np.interp(times, at, joint) for joint in path.T], axis=1)
+            for path in smooth_paths(problems, steps.advance)
+        ]
 
     def _targets(self, index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Targets and weights (n, 6, 3) of one hand, as `smooth_path` takes them."""

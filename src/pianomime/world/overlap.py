@@ -51,7 +51,7 @@ def overlap(joints: NDArray[np.floating]) -> Overlap:
     """
     if joints.ndim != 2 or joints.shape[1] != LAYOUT.hands_size:
         raise ValueError(f"joints must be (T, {LAYOUT.hands_size}), not {joints.shape}")
-    model, hand_of = _colliding_hands()
+    model, hand_of = colliding_hands()
     data = mujoco.MjData(model)
     hands, fingers = np.zeros(len(joints)), np.zeros((len(joints), len(SIDES)))
     for row, pose in enumerate(joints):
@@ -73,7 +73,7 @@ def overlap(joints: NDArray[np.floating]) -> Overlap:
 
 
 @cache
-def _colliding_hands() -> tuple[mujoco.MjModel, NDArray[np.int64]]:
+def colliding_hands() -> tuple[mujoco.MjModel, NDArray[np.int64]]:
     """A model in which the hands, and the fingers of a hand, collide; the hand of each geom."""
     spec = hands_spec()
     # Sleeping bodies would not be looked at; the newer collider tells depths of meshes better.
