@@ -63,6 +63,7 @@ def performance(
         effort=2,
         touch="goebl-bresin",
         works_pedal=False,
+        world="paper",
         plan=plan(score) if planned else None,
         ctrl=draw.normal(size=(frames, 1, 46)),
         qpos=draw.normal(size=(frames, 142)),

@@ -29,8 +29,9 @@ from pianomime.report.mp3 import write_mp3
 from pianomime.world.render import RenderUnavailable
 
 PROTOCOL = (
-    "song", "player", "effort", "song_seconds", "frames", "protocol", "touch", "music", "body",
-    "precision", "recall", "f1", "onset_f1", "plan_seconds", "simulate_seconds", "realtime_factor",
+    "song", "player", "effort", "song_seconds", "frames", "protocol", "touch", "world",
+    "music", "body", "precision", "recall", "f1", "onset_f1", "plan_seconds", "simulate_seconds",
+    "realtime_factor",
 )  # fmt: skip
 
 

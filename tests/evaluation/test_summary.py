@@ -43,6 +43,7 @@ def test_a_row_holds_what_was_measured_rounded() -> None:
         "frames": frames,
         "protocol": protocol_digest(),
         "touch": "goebl-bresin",
+        "world": "paper",
         "music": json_of(asdict(performance.music())),
         "body": json_of(asdict(body_metrics(performance))),
         **{name: round(value, 6) for name, value in metrics.items()},

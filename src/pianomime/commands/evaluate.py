@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import tyro
 
 from pianomime.keyboard import EXCERPT_SECONDS
+from pianomime.world_names import WorldName
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Evaluate:
       pianomime evaluate FOLDER more/SONG.mid fur-elise -o out/all --jobs 4
       pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
       pianomime evaluate FOLDER --lead-in 0.5
+      pianomime evaluate FOLDER --world solid
       pianomime evaluate DEMO.npz DEMOS/*.npz --player demonstration
       pianomime evaluate FOLDER --player my_module:make_player --planner.beam 200
     """
@@ -53,6 +55,9 @@ class Evaluate:
     """How hard to try: 0 plays in one pass; 1 to 3 try variations where notes would go wrong, and
     zero-shot rehearses first. On two cores 1 takes about as long as the music or less, 2 and 3
     several times longer. For generalists it is 2, 5, 20 or 100 steps of the diffusion."""
+    world: Annotated[WorldName | None, tyro.conf.arg(help_behavior_hint="")] = None
+    """World in which it plays: paper, where hands pass through each other, or solid, where they
+    collide and what moves them has limits. The player's own if not given."""
     settings: tyro.conf.Suppress[dict[str, Any]] = field(default_factory=dict)
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
@@ -85,13 +90,16 @@ class Evaluate:
 
         seeded = f"-seed{self.seed}" if self.seed else ""
         # A player may be called by a path or a module.
-        out = self.out or Path("out", f"evaluate-{file_name(self.player)}-{self.effort}{seeded}")
+        there = f"-{self.world}" if self.world else ""
+        name = f"evaluate-{file_name(self.player)}-{self.effort}{there}{seeded}"
+        out = self.out or Path("out", name)
         with bars() as progress:
             results = evaluate(
                 self.paths,
                 self.player,
                 effort=self.effort,
                 seed=self.seed,
+                world=self.world,
                 settings=self.settings,
                 seconds=self.seconds,
                 lead_in=self.lead_in,

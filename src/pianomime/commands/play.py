@@ -10,6 +10,7 @@ import tyro
 
 from pianomime.commands.report import make_report
 from pianomime.keyboard import EXCERPT_SECONDS, LEAD_IN_SECONDS
+from pianomime.world_names import WorldName
 
 if TYPE_CHECKING:
     from pianomime.music import Score
@@ -40,6 +41,7 @@ class Play:
       pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
       pianomime play SONG.mid --lead-in 0
+      pianomime play SONG.mid --world solid
       pianomime play DEMO.npz --player demonstration-ik
       pianomime play SONG.mid --player RUN
       pianomime play SONG.mid --player my_module:make_player --seed 1
@@ -63,6 +65,9 @@ class Play:
     several times longer. For generalists it is 2, 5, 20 or 100 steps of the diffusion."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Seed of everything that is random."""
+    world: Annotated[WorldName | None, tyro.conf.arg(help_behavior_hint="")] = None
+    """World in which it plays: paper, where hands pass through each other, or solid, where they
+    collide and what moves them has limits. The player's own if not given."""
     settings: tyro.conf.Suppress[dict[str, Any]] = field(default_factory=dict)
     """Settings of the player, such as `--planner.beam 200`; `pianomime players` lists them."""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = EXCERPT_SECONDS
@@ -97,7 +102,7 @@ class Play:
         path = find_song(self.song)
         shown = path.suffix == ".npz"
         name = self.player or ("demonstration" if shown else "zero-shot")
-        casting = Casting.of(name, self.effort, self.seed, **self.settings)
+        casting = Casting.of(name, self.effort, self.seed, self.world, **self.settings)
         lead_in = self.lead_in
         if lead_in is None:
             lead_in = LEAD_IN_SECONDS if casting.takes_lead_in else 0.0

@@ -53,6 +53,7 @@ def evaluate(
     *,
     effort: int = EFFORT,
     seed: int = 0,
+    world: str | None = None,
     settings: Mapping[str, Any] | None = None,
     seconds: float = EXCERPT_SECONDS,
     lead_in: float = 0.0,
@@ -75,6 +76,8 @@ def evaluate(
             process, one song after the other, and nothing of an earlier call is reused.
         effort: how hard it tries, 0 to 3.
         seed: of everything that is random.
+        world: name of the world in which it plays, as `load_player` takes it; the player's own if
+            None.
         settings: of the player, as `load_player` takes them.
         seconds: how much of each song to play at most, from its first note [s].
         lead_in: silence before the first note [s], as in `pianomime.excerpt`; 0 is the paper's
@@ -86,16 +89,17 @@ def evaluate(
         progress: called with the songs done, the songs in all and their mean F1 so far.
 
     Returns:
-        What `results.json` holds: `player`, `effort`, `seed`, `settings`, `seconds` (None: whole
-        songs) and `lead_in` as asked for, `songs` (a row each, in the order of `paths`), `mean` (of
-        whatever was measured, over the songs that did not fail and in which there was something to
-        measure; empty if all failed), `measured` (of how many songs each mean is) and `causes`
+        What `results.json` holds: `player`, `effort`, `seed`, `world` (None: each
+        player's own, which its row names), `settings`, `seconds` (None: whole songs) and `lead_in`
+        as asked for, `songs` (a row each, in the order of `paths`), `mean` (of whatever was
+        measured, over the songs that did not fail and in which there was something to measure;
+        empty if all failed), `measured` (of how many songs each mean is) and `causes`
         (`missed` and `wrong`: the share of the key-frames wanted in all songs that each cause cost,
         the costliest first).
 
     Raises:
-        InputError: a path stands for no song, or there is no such player or setting, or its
-            files cannot be read, or it takes no lead-in.
+        InputError: a path stands for no song, or there is no such player, world or setting, or it
+            does not play in that world, or its files cannot be read, or it takes no lead-in.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
@@ -105,8 +109,10 @@ def evaluate(
         raise InputError(f"jobs must be 1 or more, not {jobs}")
     chosen = _checked(flat(settings or {}))
     # What is wrong with the player is reported here, once, and not by every song.
-    casting = Casting.of(player, effort, seed, **chosen)
+    casting = Casting.of(player, effort, seed, world, **chosen)
     loaded = casting.player
+    # Demonstrations have players of their own, whose world is known when they play.
+    plays_in = world if loaded is None else loaded.world
     if not any(map(casting.can_play, songs)):
         raise InputError(f"{player}: plays demonstrations (.npz), and none is given")
     if loaded is not None and loaded.excerpt is not None:
@@ -123,7 +129,7 @@ def evaluate(
     if not only_here:
         files = files_digest(player_files(str(player)))
         part = f"{seconds:g}", float(lead_in)
-        key = [str(player), effort, seed, chosen, *part, files, protocol_digest()]
+        key = [str(player), effort, seed, plays_in, chosen, *part, files, protocol_digest()]
         made_by = f"{json.dumps(key, sort_keys=True)} {_program_hash()}"
     store = None if out is None else _Store(Path(out), made_by)
     with nullcontext() if store is None else store.held():
@@ -155,6 +161,7 @@ def evaluate(
                 "player": str(player),
                 "effort": effort,
                 "seed": seed,
+                "world": world,
                 "settings": chosen,
                 "seconds": seconds,
                 "lead_in": lead_in,
@@ -175,6 +182,7 @@ def evaluate(
             "player": shown(player.name if isinstance(player, Player) else player),
             "effort": player.effort if isinstance(player, Player) else effort,
             "seed": None if isinstance(player, Player) else seed,
+            "world": plays_in,
             "settings": chosen,
             "seconds": seconds if math.isfinite(seconds) else None,
             "lead_in": float(lead_in),

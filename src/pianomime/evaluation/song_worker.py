@@ -19,13 +19,15 @@ def load_song_worker(setup: dict[str, Any]) -> Callable[[dict[str, str]], dict[s
     """Load a player, once for all songs of a process.
 
     Args:
-        setup: `player`, `effort`, `seed` and `settings`, what `load_player` takes; `seconds`, how
-            much of a song to play at most, and `lead_in`, the silence before it [s].
+        setup: `player`, `effort`, `seed`, `world` and `settings`, what `load_player` takes;
+            `seconds`, how much of a song to play at most, and `lead_in`, the silence before it [s].
 
     Returns:
         What plays the song of a `song_request` and gives its row, as `play_song` does.
     """
-    casting = Casting.of(setup["player"], setup["effort"], setup["seed"], **setup["settings"])
+    casting = Casting.of(
+        setup["player"], setup["effort"], setup["seed"], setup["world"], **setup["settings"]
+    )
     return lambda request: play_song(casting, request, setup["seconds"], setup["lead_in"])
 
 

@@ -86,6 +86,7 @@ ROW_SCHEMA: dict[str, Schema] = {
     "frames": _COUNT,
     "protocol": Field("text"),
     "touch": Field("text"),
+    "world": Field("text"),
     "music": MUSIC_SCHEMA,
     "body": BODY_SCHEMA,
     **dict.fromkeys(("precision", "recall", "f1", "onset_f1"), _SHARE),
@@ -106,9 +107,9 @@ def summarize(performance: Performance) -> Row:
     Returns:
         `song`, `player` and `effort`; `song_seconds` and `frames`; `music`, an object with
         `pianomime.music.MusicMetrics`, and `protocol`, the digest of their protocol; `touch`, the
-        map that velocities were read with; `body`, an object with
-        `pianomime.players.body.BodyMetrics`; of the paper's protocol `precision`, `recall` and
-        `f1`, and `onset_f1` at its 20 Hz, 0..1, and `pedal_f1` where the player works the pedal;
+        map that velocities were read with; `world`, the name of that in which it was played;
+        `body`, an object with `pianomime.players.body.BodyMetrics`; of the paper's protocol
+        `precision`, `recall` and `f1`, and `onset_f1` at its 20 Hz, 0..1, and `pedal_f1` where the player works the pedal;
         `plan_seconds`, `simulate_seconds` and `realtime_factor`, which is `song_seconds` divided by
         their sum; `notes` of the score and `dropped_notes`, those that the planner did not plan;
         `blow_ups`, the number of frames in which the physics became unstable; `remarks`, what was
@@ -122,6 +123,7 @@ def summarize(performance: Performance) -> Row:
         "frames": len(performance),
         "protocol": protocol_digest(),
         "touch": performance.touch,
+        "world": performance.world,
         "music": json_of(asdict(performance.music())),
         "body": json_of(asdict(body_metrics(performance))),
         **{name: round(value, 6) for name, value in performance.metrics().items()},

@@ -160,7 +160,7 @@ def _of_motion(performance: Performance, whole: NDArray[np.bool_]) -> dict[str, 
     another: dict[str, float | None] = dict.fromkeys(_OF_MOTION, np.nan)
     if not np.isfinite(performance.ctrl).all():
         return another
-    model = world_model()
+    model = world_model(performance.world)
     hinges, rails, pushing = _joints_and_rails()
     limited = np.flatnonzero(model.actuator_forcelimited)
     limits = np.abs(model.actuator_forcerange[limited]).max(axis=1) * (1 - _END)

@@ -37,6 +37,7 @@ from pianomime.track import (
     RehearsedTracker,
     Tracker,
 )
+from pianomime.world_names import PAPER
 
 ZERO_SHOT_20HZ = "zero-shot-20hz"
 """The zero-shot player of frames, in the paper's protocol: one control a frame, notes begin and end
@@ -47,15 +48,17 @@ class DemonstrationNeededError(InputError):
     """The player plays demonstrations alone, and none was given."""
 
 
-def _with_sampling(tracker: Tracker, effort: int, sampling: PredictiveSamplingConfig) -> Tracker:
-    return PredictiveSamplingTracker(tracker, sampling) if effort else tracker
+def _with_sampling(
+    tracker: Tracker, effort: int, sampling: PredictiveSamplingConfig, world: str
+) -> Tracker:
+    return PredictiveSamplingTracker(tracker, sampling, world=world) if effort else tracker
 
 
 def _budget(effort: int, seed: int) -> PredictiveSamplingConfig:
     return replace(PredictiveSamplingConfig.of_effort(effort or 1), seed=seed)
 
 
-def _zero_shot(effort: int, seed: int, **settings: Any) -> Player:
+def _zero_shot(effort: int, seed: int, world: str = PAPER, **settings: Any) -> Player:
     planner, tracker, rehearsal, sampling = configure(
         settings,
         planner=ZeroShotConfig(fingering=FingeringConfig.notes()),
@@ -63,54 +66,69 @@ def _zero_shot(effort: int, seed: int, **settings: Any) -> Player:
         rehearsal=RehearsalConfig(),
         sampling=replace(NoteSamplingConfig.of_effort(effort or 1), seed=seed),
     )
-    controls: Tracker = KeystrokeTracker(tracker)
+    controls: Tracker = KeystrokeTracker(tracker, world)
     if effort:
-        rehearsed = RehearsedTracker(KeystrokeTracker(tracker), rehearsal)
+        rehearsed = RehearsedTracker(KeystrokeTracker(tracker, world), rehearsal)
         controls = NoteSamplingTracker(rehearsed, sampling)
     touch = tracker.stroke.touch
-    return PlannedPlayer("zero-shot", ZeroShotPlanner(planner), controls, effort, touch=touch)
+    return PlannedPlayer(
+        "zero-shot", ZeroShotPlanner(planner), controls, effort, touch=touch, world=world
+    )
 
 
-def _zero_shot_20hz(effort: int, seed: int, **settings: Any) -> Player:
+def _zero_shot_20hz(effort: int, seed: int, world: str = PAPER, **settings: Any) -> Player:
     planner, tracker, sampling = configure(
         settings,
         planner=ZeroShotConfig(),
         tracker=DynamicConfig(),
         sampling=_budget(effort, seed),
     )
-    controls = _with_sampling(DynamicTracker(tracker), effort, sampling)
-    return PlannedPlayer(ZERO_SHOT_20HZ, ZeroShotPlanner(planner), controls, effort)
+    controls = _with_sampling(DynamicTracker(tracker, world), effort, sampling, world)
+    return PlannedPlayer(ZERO_SHOT_20HZ, ZeroShotPlanner(planner), controls, effort, world=world)
 
 
-def _zero_shot_ik(effort: int, seed: int, **settings: Any) -> Player:
+def _zero_shot_ik(effort: int, seed: int, world: str = PAPER, **settings: Any) -> Player:
     planner, tracker = configure(settings, planner=ZeroShotConfig(), tracker=IkConfig())
-    return PlannedPlayer("zero-shot-ik", ZeroShotPlanner(planner), IkTracker(tracker))
+    return PlannedPlayer("zero-shot-ik", ZeroShotPlanner(planner), IkTracker(tracker), world=world)
 
 
-def _fingers(effort: int, seed: int, weights: str | Path | None = None, **settings: Any) -> Player:
+def _fingers(
+    effort: int,
+    seed: int,
+    weights: str | Path | None = None,
+    world: str = PAPER,
+    **settings: Any,
+) -> Player:
     planner, sampling = configure(
         settings, planner=ZeroShotConfig(), sampling=_budget(effort, seed)
     )
-    controls = _with_sampling(load_finger_tracker(weights), effort, sampling)
-    return PlannedPlayer(FINGERS, ZeroShotPlanner(planner), controls, effort)
+    controls = _with_sampling(load_finger_tracker(weights, world), effort, sampling, world)
+    return PlannedPlayer(FINGERS, ZeroShotPlanner(planner), controls, effort, world=world)
 
 
 def _demonstration(
-    effort: int, seed: int, demonstration: Demonstration | str | Path = "", **settings: Any
+    effort: int,
+    seed: int,
+    demonstration: Demonstration | str | Path = "",
+    world: str = PAPER,
+    **settings: Any,
 ) -> Player:
     tracker, sampling = configure(settings, tracker=DynamicConfig(), sampling=_budget(effort, seed))
     planner = _demonstration_planner(demonstration)
-    controls = _with_sampling(DynamicTracker(tracker), effort, sampling)
-    return PlannedPlayer("demonstration", planner, controls, effort)
+    controls = _with_sampling(DynamicTracker(tracker, world), effort, sampling, world)
+    return PlannedPlayer("demonstration", planner, controls, effort, world=world)
 
 
 def _demonstration_ik(
-    effort: int, seed: int, demonstration: Demonstration | str | Path = "", **settings: Any
+    effort: int,
+    seed: int,
+    demonstration: Demonstration | str | Path = "",
+    world: str = PAPER,
+    **settings: Any,
 ) -> Player:
     (tracker,) = configure(settings, tracker=IkConfig())
-    return PlannedPlayer(
-        "demonstration-ik", _demonstration_planner(demonstration), IkTracker(tracker)
-    )
+    planner = _demonstration_planner(demonstration)
+    return PlannedPlayer("demonstration-ik", planner, IkTracker(tracker), world=world)
 
 
 def _demonstration_planner(demonstration: Demonstration | str | Path) -> DemonstrationPlanner:
@@ -122,12 +140,18 @@ def _demonstration_planner(demonstration: Demonstration | str | Path) -> Demonst
 
 
 def _generalist(method: str) -> PlayerFactory:
-    def make(effort: int, seed: int, weights: str | Path | None = None, **settings: Any) -> Player:
+    def make(
+        effort: int,
+        seed: int,
+        weights: str | Path | None = None,
+        world: str = PAPER,
+        **settings: Any,
+    ) -> Player:
         (sampler,) = configure(settings, sampler=SAMPLERS[effort])
         *high, low = zip(GENERALISTS[method], weight_files(method, weights), strict=True)
         tracker = load_policy_tracker(low[1], sampler, seed, low[0])
         fingertips = load_policy(high[0][1], sampler, high[0][0]) if high else None
-        return GeneralistPlayer(method, tracker, fingertips, seed, effort)
+        return GeneralistPlayer(method, tracker, fingertips, seed, effort, world)
 
     return make
 

@@ -28,6 +28,7 @@ class Casting:
         source: as `load_player` takes it.
         effort: how hard it tries, 0 to 3.
         seed: of everything that is random.
+        world: name of the world in which it plays; each player's own if None.
         settings: of the player, by name.
         player: who plays all files; None where each demonstration has a player of its own, which
             follows the demonstration's plan.
@@ -36,27 +37,37 @@ class Casting:
     source: str | Path | Player
     effort: int
     seed: int
+    world: str | None
     settings: dict[str, Any]
     player: Player | None
 
     @classmethod
-    def of(cls, source: str | Path | Player, effort: int, seed: int, **settings: Any) -> Casting:
+    def of(
+        cls,
+        source: str | Path | Player,
+        effort: int,
+        seed: int,
+        world: str | None = None,
+        **settings: Any,
+    ) -> Casting:
         """Load the player, where it is one for all files.
 
         Args:
             source: as `load_player` takes it.
             effort: how hard it tries, 0 to 3.
             seed: of everything that is random.
+            world: name of the world in which it plays; each player's own if None.
             **settings: of the player.
 
         Raises:
-            InputError: there is no such player, effort or setting, or its files cannot be used.
+            InputError: there is no such player, effort, world or setting, it does not play in that
+                world, or its files cannot be used.
         """
         try:
-            player = load_player(source, effort, seed, **settings)
+            player = load_player(source, effort, seed, world, **settings)
         except DemonstrationNeededError:
             player = None
-        return cls(source, effort, seed, settings, player)
+        return cls(source, effort, seed, world, settings, player)
 
     def can_play(self, path: Path) -> bool:
         """Whether the player plays files of this kind."""
@@ -124,6 +135,11 @@ class Casting:
         if self.player is not None:
             return self.player, shown.score.delay(lead_in)
         made = load_player(
-            self.source, self.effort, self.seed, demonstration=shown, **self.settings
+            self.source,
+            self.effort,
+            self.seed,
+            self.world,
+            demonstration=shown,
+            **self.settings,
         )
         return made, shown.score

@@ -11,6 +11,7 @@ from pianomime.policies.policy import Policy
 from pianomime.policies.policy_tracker import PolicyTracker
 from pianomime.short_repr import short_repr
 from pianomime.track import Controller
+from pianomime.world_names import PAPER
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class GeneralistPlayer(Player):
         high: the fingertip policy; None for a policy of one stage.
         seed: of the fingertip policy's sampling.
         effort: how many steps a diffusion is sampled in, 0 to 3.
+        world: see `Player`; the policies were trained in the paper's.
     """
 
     name: str
@@ -30,6 +32,7 @@ class GeneralistPlayer(Player):
     high: Policy | None = None
     seed: int = 0
     effort: int = 0
+    world: str = PAPER
 
     def __repr__(self) -> str:
         return short_repr(self, repr(self.name), f"effort {self.effort}")

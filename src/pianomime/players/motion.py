@@ -20,14 +20,17 @@ they are the same bit for bit; another may round in another way."""
 
 
 class FrameMotion(NamedTuple):
-    """The hands in one frame, right 27 joints then left 27.
+    """Keys and hands in one frame; of the hands right 27 joints, then left 27.
 
     Attributes:
+        position: (11, 142) of all joints, keys first, at the beginning, and after each physics step
+            [rad, m].
         velocity: (11, 54) of the joints at the beginning, and after each physics step [rad/s, m/s].
         force: (10, 46) of the actuators in each physics step, right 23 then left 23 [N m, N].
         same: whether it led to the positions that the performance has kept.
     """
 
+    position: NDArray[np.float64]
     velocity: NDArray[np.float64]
     force: NDArray[np.float64]
     same: bool
@@ -45,18 +48,20 @@ def motion(performance: Performance) -> Iterator[FrameMotion]:
     Raises:
         ValueError: a control is not finite.
     """
+    position = np.empty((SUBSTEPS + 1, LAYOUT.qpos_size))
     velocity = np.empty((SUBSTEPS + 1, LAYOUT.hands_size))
     force = np.empty((SUBSTEPS, LAYOUT.ctrl_size))
-    world, steps = World(quiet=True), 0
+    world, steps = World(performance.world, quiet=True), 0
 
     def watch() -> None:
         nonlocal steps
         step = steps % SUBSTEPS
+        position[step + 1] = world.data.qpos
         velocity[step + 1], force[step] = world.data.qvel[KEYS:], world.data.actuator_force
         steps += 1
 
     for ctrl, kept in zip(performance.ctrl, performance.qpos, strict=True):
-        velocity[0] = world.data.qvel[KEYS:]
+        position[0], velocity[0] = world.data.qpos, world.data.qvel[KEYS:]
         world.step(ctrl, watch=watch)
         apart = np.abs(world.qpos_hands - kept[KEYS:]).max()
-        yield FrameMotion(velocity.copy(), force.copy(), bool(apart <= _SAME))
+        yield FrameMotion(position.copy(), velocity.copy(), force.copy(), bool(apart <= _SAME))

@@ -40,6 +40,7 @@ from pianomime.short_repr import count, short_repr
 from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import SUBSTEPS
 from pianomime.world.touch import LOUDEST, SOFTEST, TOUCHES
+from pianomime.world_names import PAPER, WORLDS
 
 _VERSION = 4
 """Of the file; version 3 had one control a frame, and neither events nor times of the pedal."""
@@ -66,6 +67,8 @@ _PLAYER = {
     "effort": Field("int", (), 0),
     "touch": Field("text", choices=tuple(TOUCHES)),
     "works_pedal": Field("bool", ()),
+    # Files from before there was more than one have none.
+    "world": Field("text", choices=WORLDS, optional=True),
 }
 _SCHEMA = {
     **_PLAYER,
@@ -89,6 +92,7 @@ class Performance:
         plan: the fingertip plan, None for players that have none.
         touch: name of the map from the speed of a key to MIDI velocity.
         works_pedal: whether the player works the pedal; otherwise the score does.
+        world: name of the world in which it was played.
         ctrl: (T, S, 46) controls, S in each frame, RIGHT 23 then LEFT 23 [rad, m].
         qpos: (T, 142) all joint positions after each frame: 88 keys, RIGHT 27, LEFT 27 [rad, m].
         key_state: (T, 88) 0..1 of the way down, after each frame.
@@ -108,6 +112,7 @@ class Performance:
     effort: int
     touch: str
     works_pedal: bool
+    world: str
     plan: FingertipPlan | None
     ctrl: NDArray[np.float64]
     qpos: NDArray[np.float64]
@@ -142,6 +147,8 @@ class Performance:
             )
         if self.touch not in TOUCHES:
             raise ValueError(f"there is no touch {self.touch!r}; there are {', '.join(TOUCHES)}")
+        if self.world not in WORLDS:
+            raise ValueError(f"there is no world {self.world!r}; there are {', '.join(WORLDS)}")
         if not (self.event_on < self.event_off).all():
             raise ValueError("an event ends before it begins")
         if not ((self.blow_ups >= 0) & (self.blow_ups < frames)).all():
@@ -268,6 +275,7 @@ class Performance:
             effort=int(arrays["effort"]),
             touch=str(arrays["touch"]),
             works_pedal=bool(arrays["works_pedal"]),
+            world=str(arrays.get("world", PAPER)),
             plan=plan_of(arrays) if all(planned) else None,
             **{name: arrays[name] for name in (*_FRAMES, *_EVENTS)},
             plan_seconds=float(arrays["plan_seconds"]),

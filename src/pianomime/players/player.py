@@ -24,6 +24,7 @@ from pianomime.world.key_sensor import KeyEvents
 from pianomime.world.layout import LAYOUT
 from pianomime.world.parameters import PHYSICS_DT
 from pianomime.world.touch import DEFAULT_TOUCH
+from pianomime.world_names import PAPER
 
 
 class Player(ABC):
@@ -38,12 +39,14 @@ class Player(ABC):
             song; None for a player of any.
         touch: name of the map from the speed of a key to MIDI velocity, as in
             `pianomime.world.touch.TOUCHES`.
+        world: name of the world in which it plays, one of `pianomime.world_names.WORLDS`.
     """
 
     name: str
     effort: int = 0
     excerpt: tuple[float, float] | None = None
     touch: str = DEFAULT_TOUCH
+    world: str = PAPER
 
     @abstractmethod
     def start(self, score: Score) -> Controller:
@@ -57,7 +60,7 @@ class Player(ABC):
         """
 
     def play(self, score: Score, progress: Progress = no_progress) -> Performance:
-        """Perform a score in a new World.
+        """Perform a score in a new World, of the name that it plays in.
 
         Args:
             score: what to play; all of it is played (see `pianomime.excerpt`).
@@ -84,7 +87,7 @@ class Player(ABC):
         pressed = np.empty((frames, KEYS), bool)
         pedal = np.empty(frames, bool)
         blow_ups = np.zeros(frames, np.int64)
-        world, notes = World(), _SoundingNotes()
+        world, notes = World(self.world), _SoundingNotes()
         for step in rollout(controller, world, score.pedal_roll()):
             frame = step.frame
             ctrl.append(np.atleast_2d(step.ctrl))
@@ -100,6 +103,7 @@ class Player(ABC):
             player=self.name,
             effort=self.effort,
             touch=self.touch,
+            world=self.world,
             works_pedal=works_pedal,
             plan=controller.plan,
             ctrl=np.array(ctrl),
@@ -157,9 +161,9 @@ class PlannedPlayer(Player):
     Attributes:
         name: what reports call it.
         planner: makes a FingertipPlan of a Score.
-        tracker: makes a Controller of the plan.
+        tracker: makes a Controller of the plan, for the same world.
         effort: how hard it tries, 0 to 3.
-        excerpt, touch: see `Player`.
+        excerpt, touch, world: see `Player`.
     """
 
     name: str
@@ -168,6 +172,7 @@ class PlannedPlayer(Player):
     effort: int = 0
     excerpt: tuple[float, float] | None = None
     touch: str = DEFAULT_TOUCH
+    world: str = PAPER
 
     def __repr__(self) -> str:
         return short_repr(self, repr(self.name), f"effort {self.effort}")

@@ -16,6 +16,7 @@ from pianomime.players.player import Player
 from pianomime.players.plugin import import_factory, one_line, plugin_files
 from pianomime.players.settings import PlayerFactory, flat, settings_of
 from pianomime.policies.methods import METHODS, methods_of, weight_files
+from pianomime.world_names import WORLDS
 
 EFFORT = 1
 """How hard players try unless told otherwise, 0 to 3."""
@@ -62,7 +63,11 @@ def is_registered(source: str | Path | Player) -> bool:
 
 
 def load_player(
-    source: str | Path | Player, effort: int = EFFORT, seed: int = 0, **settings: Any
+    source: str | Path | Player,
+    effort: int = EFFORT,
+    seed: int = 0,
+    world: str | None = None,
+    **settings: Any,
 ) -> Player:
     """Load a player.
 
@@ -79,15 +84,21 @@ def load_player(
             wrong before it is played, ever more of them. Generalists sample their diffusion in
             ever more steps.
         seed: of everything that is random.
+        world: name of the world in which it is to play, one of `pianomime.world_names.WORLDS`; the
+            player's own if None. A factory of others that can choose takes it as `world`.
         **settings: of planner, tracker and search, such as `planner={"beam": 200}` or
             `**{"planner.beam": 200}` (see `player_settings`).
 
     Raises:
-        InputError: there is no such player, effort or setting, or its files cannot be used.
+        InputError: there is no such player, effort, world or setting, it does not play in that
+            world, or its files cannot be used.
     """
+    if world is not None and world not in WORLDS:
+        raise unknown_name("world", world, WORLDS)
     if isinstance(source, Player):
         if settings:
             raise InputError(f"{source.name}: a player that is made already takes no settings")
+        _check_world(source.name, source, world)
         return source
     if not isinstance(source, str | Path):
         raise InputError(f"a player is a name, a path or a pianomime.Player, not {source!r}")
@@ -97,8 +108,11 @@ def load_player(
         raise InputError(f"seed must be 0 or more, not {seed!r}")
     factory, _ = _find(source)
     arguments = {"effort": effort, "seed": seed, **flat(settings)}
+    signature = inspect.signature(factory)
+    if world is not None and "world" in signature.parameters:
+        arguments["world"] = world
     try:
-        inspect.signature(factory).bind(**arguments)
+        signature.bind(**arguments)
     except TypeError as error:
         raise InputError(f"{source}: {error}") from error
     ours = isinstance(factory, partial) or factory in FACTORIES.values()
@@ -106,6 +120,7 @@ def load_player(
         player = factory(**arguments)
     if not isinstance(player, Player):
         raise InputError(f"{source}: makes a {type(player).__name__}, which is no pianomime.Player")
+    _check_world(str(source), player, world)
     return player
 
 
@@ -183,6 +198,12 @@ def _of_weights(method: str, weights: Path) -> _Found:
 @cache
 def _entry_points() -> dict[str, str]:
     return {point.name: point.value for point in entry_points(group=GROUP)}
+
+
+def _check_world(name: str, player: Player, world: str | None) -> None:
+    """Refuse a player that plays in another world than it was asked to."""
+    if world not in (None, player.world):
+        raise InputError(f"{name}: plays in the world {player.world!r}, not in {world!r}")
 
 
 def _is_integer(value: object) -> bool:

@@ -11,6 +11,8 @@ from pianomime.policies.finger_residual import FingerResidualTracker
 from pianomime.policies.network_file import load_network, load_policy
 from pianomime.policies.policy_tracker import PolicyTracker
 from pianomime.policies.sampler import Sampler
+from pianomime.track import DynamicTracker
+from pianomime.world_names import PAPER
 
 GENERALISTS: dict[str, tuple[str, ...]] = {
     "two-stage-diff": ("high-diff", "low-diff"),
@@ -41,16 +43,20 @@ _TRAINED_BY = {FINGERS: "train-fingers", "multi-task-sac": "train-sac"}
 """The command that trains a policy, where it is not `train POLICY`."""
 
 
-def load_finger_tracker(weights: str | Path | None = None) -> FingerResidualTracker:
+def load_finger_tracker(
+    weights: str | Path | None = None, world: str = PAPER
+) -> FingerResidualTracker:
     """The tracker with the finger residual.
 
     Args:
         weights: folder of the weights; see `weights_folder`.
+        world: name of the world in which it moves hands; the policy was trained in the paper's.
 
     Raises:
         InputError: its weights are not there, or cannot be read.
     """
-    return FingerResidualTracker(load_network(policy_path(FINGERS, weights), FINGERS)[0])
+    policy = load_network(policy_path(FINGERS, weights), FINGERS)[0]
+    return FingerResidualTracker(policy, DynamicTracker(world=world))
 
 
 def load_policy_tracker(

@@ -16,6 +16,7 @@ from pianomime.short_repr import short_repr
 from pianomime.track import Controller
 from pianomime.world import World
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
+from pianomime.world_names import PAPER
 
 if TYPE_CHECKING:
     from pianomime.learn.expert.expert_run import ExpertRun
@@ -104,7 +105,7 @@ def play_episode(run: ExpertRun) -> Episode:
         expert_tracker(run).start(demonstration.plan),
         base_controller(env, demonstration.plan),
     )
-    columns = record(controller, base, demonstration.score)
+    columns = record(controller, base, demonstration.score, env.world)
     f1 = fill_columns(
         columns,
         demonstration.score.roll(),
@@ -116,13 +117,16 @@ def play_episode(run: ExpertRun) -> Episode:
     )
 
 
-def record(controller: Controller, base: Controller, score: Score) -> dict[str, NDArray[Any]]:
+def record(
+    controller: Controller, base: Controller, score: Score, world_name: str = PAPER
+) -> dict[str, NDArray[Any]]:
     """Play a score, and record states and controls.
 
     Args:
         controller: plays.
         base: the base controller, asked for its control in every state.
         score: what is played.
+        world_name: name of the world in which it is played.
 
     Returns:
         The columns; those that `fill_columns` fills are not filled yet.
@@ -130,7 +134,7 @@ def record(controller: Controller, base: Controller, score: Score) -> dict[str, 
     Raises:
         InputError: the controller gives several controls a frame, which is no action of a frame.
     """
-    pedal, world = score.pedal_roll(), World(quiet=True)
+    pedal, world = score.pedal_roll(), World(world_name, quiet=True)
     columns = empty_columns(len(pedal))
 
     def observe(frame: int) -> None:

@@ -38,7 +38,7 @@ from pianomime.world.layout import LAYOUT
 
 def base_tracker(config: EnvConfig) -> BatchTracker:
     """The tracker that makes the base controller of a config."""
-    return IkTracker() if config.base == "ik" else DynamicTracker()
+    return IkTracker() if config.base == "ik" else DynamicTracker(world=config.world)
 
 
 def base_controller(config: EnvConfig, plan: FingertipPlan) -> BatchController:
@@ -112,7 +112,7 @@ class SongBatch:
     ) -> None:
         self.demonstration, self.config = demonstration, config
         self._reference = Reference.of(demonstration)
-        self._worlds = WorldBatch(num_envs, threads, quiet=True)
+        self._worlds = WorldBatch(num_envs, threads, quiet=True, model=config.world)
         self._base = base_controller(config, demonstration.plan)
         self.reward_terms = check_reward_terms(
             default_reward_terms(config.reward) if reward_terms is None else reward_terms
@@ -284,7 +284,8 @@ class SongBatch:
     def _states_of_base(self) -> NDArray[np.float64]:
         """(T, S) states of the world before each frame when the base controller plays alone."""
         if self._start_states is None:
-            world, base = World(quiet=True), base_controller(self.config, self._reference.plan)
+            world = World(self.config.world, quiet=True)
+            base = base_controller(self.config, self._reference.plan)
             states = [world.state()]
             states += [world.state() for _ in rollout(base, world, self._reference.pedal)]
             self._start_states = np.array(states[:-1])

@@ -10,7 +10,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pianomime.errors import InputError, unknown_name
+from pianomime.learn.runs.config_json import ADDED
 from pianomime.validation import one_of, whole_numbers, within
+from pianomime.world_names import PAPER, WORLDS, WorldName
 
 _MOST_AHEAD = 200
 """Frames ahead that a policy may observe, ten seconds."""
@@ -96,8 +98,11 @@ class EpisodeConfig:
 
 @dataclass(frozen=True)
 class EnvConfig:
-    """The environment: base controller, observation, action, reward, episode."""
+    """The environment: world, base controller, observation, action, reward, episode."""
 
+    world: WorldName = field(default=PAPER, metadata={ADDED: True})
+    """The world in which it is played: the paper's, or one in which hands are solid and what moves
+    them has limits."""
     base: Literal["ik", "dynamic"] = "ik"
     """Base controller that the residual is added to: the paper's inverse kinematics, or the
     dynamic tracker of `zero-shot-20hz`."""
@@ -107,6 +112,7 @@ class EnvConfig:
     episode: EpisodeConfig = field(default_factory=EpisodeConfig)
 
     def __post_init__(self) -> None:
+        one_of("env.world", self.world, WORLDS)
         one_of("env.base", self.base, ("ik", "dynamic"))
 
 

@@ -67,7 +67,8 @@ def load_expert(path: Path) -> tuple[Player, ExpertRun]:
     run = ExpertRun.load(path)
     excerpt = run.start, run.seconds
     planner, tracker = DemonstrationPlanner(run.demonstration), expert_tracker(run)
-    return PlannedPlayer("expert", planner, tracker, excerpt=excerpt), run
+    world = run.config.env.world
+    return PlannedPlayer("expert", planner, tracker, excerpt=excerpt, world=world), run
 
 
 def load_expert_player(effort: int, seed: int, run: str | Path = "") -> Player:

@@ -136,7 +136,8 @@ class _ExpertCallback(ResumableCallback):
         tracker = ResidualPolicyTracker.from_arrays(
             self._run.demonstration, self._run.config, weights
         )
-        player = PlannedPlayer("expert", DemonstrationPlanner(self._run.demonstration), tracker)
+        planner, world = DemonstrationPlanner(self._run.demonstration), self._run.config.env.world
+        player = PlannedPlayer("expert", planner, tracker, world=world)
         with torch_threads(1):
             metrics = player.play(self._run.demonstration.score).metrics()
         made = Evaluation(steps, metrics["precision"], metrics["recall"], metrics["f1"])

@@ -106,8 +106,9 @@ class _PassPlayer(Player):
     ) -> None:
         inner: Tracker = base_tracker(run.config.env) if ctrl is None else ReplayTracker(ctrl)
         config = pass_config(run.config.search, number, run.config.seed)
+        self.world = run.config.env.world
         self._tracker = PredictiveSamplingTracker(
-            inner, config, run.demonstration.score.roll(), threads
+            inner, config, run.demonstration.score.roll(), threads, self.world
         )
         self._plan = run.demonstration.plan
         self._controller: PredictiveSamplingController | None = None

@@ -17,9 +17,21 @@ _MOST_INT = 2**63 - 1
 """The largest whole number that arrays can hold."""
 
 
+ADDED = "added"
+"""Metadata of a field that was added later: JSON may be without it, and is where it has its
+default, so that older runs are read, and resumed, as those that they are."""
+
+
 def to_json(config: DataclassInstance) -> dict[str, Any]:
     """A config as nested dictionaries that JSON can hold."""
-    return dataclasses.asdict(config)
+    content = {}
+    for field in dataclasses.fields(config):
+        value = getattr(config, field.name)
+        if ADDED in field.metadata and value == field.default:
+            continue
+        nested = dataclasses.is_dataclass(value) and not isinstance(value, type)
+        content[field.name] = to_json(value) if nested else value
+    return content
 
 
 def from_json(kind: type[_T], content: Any) -> _T:
@@ -35,7 +47,9 @@ def from_json(kind: type[_T], content: Any) -> _T:
     if not isinstance(content, dict):
         raise InputError(f"{kind.__name__} must be an object, not {content!r}")
     hints = typing.get_type_hints(kind)
-    if set(content) != set(hints):
+    fields = dataclasses.fields(typing.cast("type[DataclassInstance]", kind))
+    added = {field.name for field in fields if ADDED in field.metadata}
+    if set(content) | added != set(hints):
         odd = ", ".join(sorted(set(content) ^ set(hints)))
         raise InputError(f"{kind.__name__} has other fields than this program's: {odd}")
     return kind(**{name: _value(name, hints[name], value) for name, value in content.items()})
