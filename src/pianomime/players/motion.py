@@ -23,13 +23,14 @@ class FrameMotion(NamedTuple):
     """Keys and hands in one frame; of the hands right 27 joints, then left 27.
 
     Attributes:
-        position: (11, 142) of all joints, keys first, at the beginning, and after each physics step
-            [rad, m].
-        velocity: (11, 54) of the joints at the beginning, and after each physics step [rad/s, m/s].
+        keys: (11, 88) angle of each key at the beginning, and after each physics step [rad].
+        position: (11, 54) of the hands' joints likewise [rad, m].
+        velocity: (11, 54) of the hands' joints likewise [rad/s, m/s].
         force: (10, 46) of the actuators in each physics step, right 23 then left 23 [N m, N].
         same: whether it led to the positions that the performance has kept.
     """
 
+    keys: NDArray[np.float64]
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -64,4 +65,7 @@ def motion(performance: Performance) -> Iterator[FrameMotion]:
         position[0], velocity[0] = world.data.qpos, world.data.qvel[KEYS:]
         world.step(ctrl, watch=watch)
         apart = np.abs(world.qpos_hands - kept[KEYS:]).max()
-        yield FrameMotion(position.copy(), velocity.copy(), force.copy(), bool(apart <= _SAME))
+        keys, hands = np.split(position, [KEYS], axis=1)
+        yield FrameMotion(
+            keys.copy(), hands.copy(), velocity.copy(), force.copy(), bool(apart <= _SAME)
+        )
