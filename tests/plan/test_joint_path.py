@@ -126,7 +126,9 @@ def test_hands_are_mirror_images() -> None:
     targets[:] = HANDS["rh"].points(HOME) + draw.normal(scale=0.01, size=(20, 6, 3))
     weights[::4, 1:] = 1 / 0.002
     clearance[:, 0] = 0.01
-    right = smooth_path(HANDS["rh"], REST, targets, weights, clearance)
-    left = smooth_path(HANDS["lh"], REST, targets * [1.0, -1.0, 1.0], weights, clearance)
+    right = smooth_path(PathProblem(HANDS["rh"], REST, targets, weights, clearance))
+    left = smooth_path(
+        PathProblem(HANDS["lh"], REST, targets * [1.0, -1.0, 1.0], weights, clearance)
+    )
     left[:, 0] *= -1
     np.testing.assert_allclose(left, right, atol=1e-6)

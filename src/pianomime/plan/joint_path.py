@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -103,10 +104,10 @@ class PathConfig:
 
 
 class Rows(NamedTuple):
-    """C more residuals of the path of a hand: r of them are to be small.
+    """C more residuals of the path of a hand, whose squares are to be small.
 
     Attributes:
-        frame: (C,) in which each counts.
+        frame: (C,) in which each counts; in order.
         residual: (C,) its value there.
         gradient: (C, 27) by the joints [1/rad, 1/m].
     """
@@ -195,9 +196,11 @@ class PathProblem:
             advance(len(whole))
         gradient += posture * (path - home) + path @ coupling
         if rows is not None:
-            squares = rows.gradient[:, :, None] * rows.gradient[:, None]
-            np.add.at(blocks, rows.frame, squares.reshape(len(squares), -1)[:, _STORED])
-            np.add.at(gradient, rows.frame, rows.residual[:, None] * rows.gradient)
+            edges = np.flatnonzero(np.diff(rows.frame, prepend=-1, append=-1))
+            for begin, end in pairwise(edges):
+                frame, more = rows.frame[begin], rows.gradient[begin:end]
+                blocks[frame] += (more.T @ more).ravel()[_STORED]
+                gradient[frame] += rows.residual[begin:end] @ more
         # A joint that is pushed against its limit stays there for this step.
         held = ((path <= hand.low) & (gradient > 0)) | ((path >= hand.high) & (gradient < 0))
         blocks[:, _LINES[0]] += held * _HELD

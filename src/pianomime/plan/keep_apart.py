@@ -23,6 +23,9 @@ from pianomime.world.layout import LAYOUT
 from pianomime.world.model import SIDES
 from pianomime.world.overlap import colliding_hands
 
+_NOWHERE = (np.zeros(0, np.int64), np.zeros(0), np.zeros((0, LAYOUT.hand_joints)))
+"""Rows of hands that are apart."""
+
 
 def smooth_paths(
     problems: list[PathProblem],
@@ -66,39 +69,59 @@ def near(paths: list[NDArray[np.float64]], config: PathConfig, lasts: float = 1.
         (left, right) residuals: the shortfall of each distance by the shortfall at which its cost
         is 1.
     """
-    model = _wary_hands(config.apart)
+    model, turns, moves = _wary_hands(config.apart)
     data = mujoco.MjData(model)
-    scale = np.sqrt(lasts) / config.near
     poses = np.empty((len(paths[0]), LAYOUT.hands_size))
     for index, path in enumerate(paths):
         poses[:, LAYOUT.among_hands(index)] = path
-    frames, shortfalls, gradients = [], [], []
-    one, other = np.zeros((2, 3, LAYOUT.hands_size))
+    # Along a normal n, a hinge moves a point p by n . (axis x (p - anchor)), which is
+    # axis . (p x n) + n . (anchor x axis), and a slide by n . axis.
+    axes, rests = np.empty((2, *poses.shape, 3))
+    places = []
     for frame, pose in enumerate(poses):
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_collision(model, data)
-        for contact in data.contact:
-            bodies = model.geom_bodyid[contact.geom]
-            mujoco.mj_jac(model, data, one, None, contact.pos, bodies[0])
-            mujoco.mj_jac(model, data, other, None, contact.pos, bodies[1])
-            frames.append(frame)
-            shortfalls.append(contact.dist - config.apart)
-            gradients.append(contact.frame[:3] @ (other - one))
-    frame, residual = np.array(frames, np.int64), scale * np.array(shortfalls)
-    gradient = scale * np.reshape(gradients, (-1, LAYOUT.hands_size))
+        axes[frame] = data.xaxis
+        rests[frame] = np.where(turns[:, None], np.cross(data.xanchor, data.xaxis), data.xaxis)
+        if data.ncon:
+            contact = data.contact
+            columns = (contact.geom, contact.dist, contact.pos, contact.frame[:, :3])
+            places.append((np.full(data.ncon, frame), *(np.array(column) for column in columns)))
+    if not places:
+        return [Rows(*_NOWHERE)] * len(SIDES)
+    frame, geom, distance, point, normal = map(np.concatenate, zip(*places, strict=True))
+    moment = np.cross(point, normal)
+    gradient = np.einsum("cjk,ck->cj", rests[frame], normal)
+    gradient += np.einsum("cjk,ck->cj", axes[frame] * turns[:, None], moment)
+    one, other = moves[model.geom_bodyid[geom]].swapaxes(0, 1)
+    gradient *= other.astype(float) - one
+    scale = np.sqrt(lasts) / config.near
     rows = []
     for index in range(len(SIDES)):
-        mine = gradient[:, LAYOUT.among_hands(index)]
-        moves = np.flatnonzero(mine.any(axis=1))
-        rows.append(Rows(frame[moves], residual[moves], mine[moves]))
+        mine = scale * gradient[:, LAYOUT.among_hands(index)]
+        some = mine.any(axis=1)
+        rows.append(Rows(frame[some], scale * (distance - config.apart)[some], mine[some]))
     return rows
 
 
 @cache
-def _wary_hands(apart: float) -> mujoco.MjModel:
-    """Hands that collide as soon as they are nearer than `apart` [m]."""
+def _wary_hands(
+    apart: float,
+) -> tuple[mujoco.MjModel, NDArray[np.bool_], NDArray[np.bool_]]:
+    """Hands that collide as soon as they are nearer than `apart` [m].
+
+    Returns:
+        The model; (54,) which joints are hinges; (bodies, 54) which joints move each body.
+    """
     model = copy.copy(colliding_hands()[0])
-    model.geom_margin[:] = apart
-    return model
+    model.geom_margin[:] = apart / 2  # MuJoCo adds those of both parts
+    # One place for each pair of parts is enough.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)
+    moves = np.zeros((model.nbody, model.njnt), bool)
+    for body in range(1, model.nbody):
+        first, count = model.body_jntadr[body], model.body_jntnum[body]
+        moves[body] = moves[model.body_parentid[body]]
+        moves[body, first : first + count] = True
+    return model, model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE, moves
