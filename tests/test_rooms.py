@@ -26,6 +26,7 @@ ROOMS = (
     ("track",),
     ("policies",),
     ("players",),
+    ("export",),
     ("video",),
     ("learn",),
     ("evaluation",),

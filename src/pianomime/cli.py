@@ -68,6 +68,9 @@ COMMANDS = {
     "score": Command(
         "pianomime.commands.score", "ScorePlaying", "score anybody's playing of a song"
     ),
+    "export": Command(
+        "pianomime.commands.export", "Export", "write a performance for a real robot"
+    ),
     "retarget": Command(
         "pianomime.commands.retarget", "Retarget", "make a demonstration of a video"
     ),
