@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from pianomime.keyboard import NO_KEY
 from pianomime.music import Score, notes_from_roll
 from pianomime.plan import FingertipPlan
 from pianomime.players.performance import Performance
+from pianomime.world import World
+from pianomime.world_names import PAPER
 
 MIDDLE_C = 39
 
@@ -79,3 +84,22 @@ def performance(
         plan_seconds=0.25,
         simulate_seconds=0.5,
     )
+
+
+def silent(frames: int) -> Performance:
+    """A performance of one note, held all the time, whose motion is still to be filled in."""
+    one = np.array([MIDDLE_C])
+    end = (frames - 1) / 20
+    song = Score(one, 0.0 * one, 0 * one + end, 0 * one + 64, np.empty((0, 2)), "one note")
+    made = performance(song)
+    assert len(made) == frames
+    return replace(made, blow_ups=np.array([], np.int64))
+
+
+def performed(ctrl: NDArray[np.float64], world: str = PAPER) -> Performance:
+    """A performance of controls (T, S, 46), as a World plays them."""
+    played, qpos = World(world), []
+    for row in ctrl:
+        played.step(row)
+        qpos.append(played.qpos)
+    return replace(silent(len(ctrl)), ctrl=ctrl, qpos=np.array(qpos), world=world)

@@ -11,12 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 import made_up
+from made_up import performed, silent
 from pianomime.keyboard import KEYS
-from pianomime.music import Score
 from pianomime.players import body
 from pianomime.players.body import body_metrics, wrist_and_fingertip_motion
 from pianomime.players.motion import motion
-from pianomime.players.performance import Performance
 from pianomime.world import World
 from pianomime.world.layout import LAYOUT
 from pianomime.world.model import world_model
@@ -33,26 +32,6 @@ OF_MOTION = (
     *("rail_speed_max", "rail_acceleration_max", "rail_force_max"),
     *("forces_at_limit", "forces_at_limit_worst"),
 )
-
-
-def empty() -> Performance:
-    """A performance of `FRAMES` frames, whose motion is still to be filled in."""
-    one = np.array([made_up.MIDDLE_C])
-    song = Score(
-        one, 0.0 * one, 0 * one + (FRAMES - 1) / 20, 0 * one + 64, np.empty((0, 2)), "one note"
-    )
-    made = made_up.performance(song)
-    assert len(made) == FRAMES
-    return replace(made, blow_ups=np.array([], np.int64))
-
-
-def performed(ctrl: NDArray[np.float64]) -> Performance:
-    """A performance of controls (T, S, 46), as a World plays them."""
-    world, qpos = World(), []
-    for row in ctrl:
-        world.step(row)
-        qpos.append(world.qpos)
-    return replace(empty(), ctrl=ctrl, qpos=np.array(qpos))
 
 
 def actuator(name: str) -> int:
@@ -160,7 +139,7 @@ def test_controls_at_an_end_are_counted() -> None:
 
 
 def test_hands_and_fingers_that_overlap_are_counted() -> None:
-    made = empty()
+    made = silent(FRAMES)
     qpos = np.zeros((FRAMES, LAYOUT.qpos_size))
     model = world_model()
     right, left = (model.joint(f"{side}_forearm_tx").qposadr[0] for side in ("rh", "lh"))
@@ -202,7 +181,7 @@ def test_nothing_to_measure_is_no_number() -> None:
     found = wrist_and_fingertip_motion(np.zeros((3, 2, 6, 3)), np.ones(3, bool))
     assert found["wrist_speed_p99"] == 0
     assert found["wrist_jerk"] is None
-    made = empty()
+    made = silent(FRAMES)
     broken = body_metrics(replace(made, blow_ups=np.arange(FRAMES)))
     assert broken.hands_overlap is None
     assert broken.rail_speed_max is None
