@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.export.joints import Joints, effort_unit
+from pianomime.export.samples import PHYSICS_RATE
 from pianomime.keyboard import KEYS
 from pianomime.players.motion import FrameMotion
-from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS
+from pianomime.world.parameters import SUBSTEPS
 
 HAND_SPEED = 2.0
 """[rad/s] Limit of every joint in Shadow Robot's own description of the hand (the URDF of its
@@ -122,12 +123,13 @@ class LimitCheck:
             moved: how the hands moved in it.
             command: (S, 46) targets of the actuators in it [rad, m].
         """
-        ended = (self._frames * SUBSTEPS + np.arange(1.0, SUBSTEPS + 1)) * PHYSICS_DT
-        self._worst["position"].see(moved.position[1:], ended)
-        self._worst["velocity"].see(moved.velocity[1:], ended)
-        self._worst["effort"].see(moved.force, ended - PHYSICS_DT)
+        began = self._frames * SUBSTEPS + np.arange(SUBSTEPS)
+        begin, end = began / PHYSICS_RATE, (began + 1) / PHYSICS_RATE
+        self._worst["position"].see(moved.position[1:], end)
+        self._worst["velocity"].see(moved.velocity[1:], end)
+        self._worst["effort"].see(moved.force, begin)
         held = np.repeat(command, SUBSTEPS // len(command), axis=0)
-        self._worst["command"].see(held, ended - PHYSICS_DT)
+        self._worst["command"].see(held, begin)
         self._frames += 1
 
     def breaches(self) -> list[Breach]:

@@ -13,6 +13,7 @@ from pianomime.export.joints import Joints
 from pianomime.keyboard import FRAME_RATE
 from pianomime.players.motion import FrameMotion, motion
 from pianomime.players.performance import Performance
+from pianomime.short_repr import count
 from pianomime.world.model import world_model
 from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS
 
@@ -77,7 +78,8 @@ def played_again(performance: Performance) -> Iterator[FrameMotion]:
     if len(performance.blow_ups):
         first = performance.blow_ups.min() / FRAME_RATE
         raise InputError(
-            f"the physics broke in {len(performance.blow_ups)} frames, first at {first:.2f} s: "
+            f"the physics broke in {count(len(performance.blow_ups), 'frame')}, first at "
+            f"{first:.2f} s: "
             "there hands were put back, which is no motion"
         )
     for frame, moved in enumerate(motion(performance)):
