@@ -8,27 +8,24 @@ forearm tx, ty, tz, wrist 2, wrist 1, then index to little from knuckle to tip, 
 from __future__ import annotations
 
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from pianomime.errors import unknown_name
 from pianomime.keyboard import BLACK, KEYS
+from pianomime.world.hand_parts import FINGER_PREFIXES as FINGER_PREFIXES
+from pianomime.world.hand_parts import SIDES as SIDES
+from pianomime.world.hand_parts import Side as Side
 from pianomime.world.parameters import (
     PARAMETERS,
     PHYSICS_DT,
     key_centres,
     key_half_sizes,
 )
-from pianomime.world_names import PAPER, WORLDS
-
-Side = Literal["rh", "lh"]
-
-SIDES: tuple[Side, Side] = ("lh", "rh")
-"""The sides in plan order (left, right)."""
-FINGER_PREFIXES = ("th", "ff", "mf", "rf", "lf")
-"""Prefixes of the fingers' names in the model, thumb first."""
+from pianomime.world.solid import collide, limit
+from pianomime.world_names import PAPER, SOLID, WORLDS
 
 _GEOM_TYPES = {
     "box": mujoco.mjtGeom.mjGEOM_BOX,
@@ -36,7 +33,7 @@ _GEOM_TYPES = {
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
 }
-# Keys and hands collide with each other; the two hands do not (as in the paper's world).
+# Keys and hands collide with each other; the two hands do not in the paper's world.
 _HAND_MASK = {"contype": 1, "conaffinity": 0}
 _KEY_MASK = {"contype": 0, "conaffinity": 1}
 _NO_CONTACT = {"contype": 0, "conaffinity": 0}
@@ -59,6 +56,9 @@ def build_spec(world: str = PAPER) -> mujoco.MjSpec:
     add_piano(spec)
     add_hand(spec, "rh")
     add_hand(spec, "lh")
+    if world == SOLID:
+        collide(spec)
+        limit(spec)
     return spec
 
 
@@ -112,6 +112,8 @@ def hand_model(side: Side, world: str = PAPER) -> mujoco.MjModel:
     """
     spec = _empty_spec(world)
     add_hand(spec, side)
+    if world == SOLID:
+        limit(spec)
     return spec.compile()
 
 

@@ -13,13 +13,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.world.hand_parts import PARTS, SIDES, apart, part_of
 from pianomime.world.layout import LAYOUT
-from pianomime.world.model import FINGER_PREFIXES, SIDES, hands_spec
-
-_PARTS = (*FINGER_PREFIXES, "")
-"""Parts of a hand: the fingers, and what is none: forearm, wrist and palm."""
-_METACARPAL = "lfmetacarpal"
-"""A body of the palm, though its name begins as the little finger's do."""
+from pianomime.world.model import hands_spec
 
 
 class Overlap(NamedTuple):
@@ -79,26 +75,13 @@ def colliding_hands() -> tuple[mujoco.MjModel, NDArray[np.int64]]:
     # Sleeping bodies would not be looked at; the newer collider tells depths of meshes better.
     spec.option.enableflags = 0
     spec.option.disableflags = 0
-    groups = [(side, part) for side in SIDES for part in _PARTS]
     for geom in spec.geoms:
-        side, _, name = geom.parent.name.partition("_")
-        group = side, _part(name)
-        geom.contype = 1 << groups.index(group)
+        part = part_of(geom.parent.name)
+        assert part is not None
+        geom.contype = 1 << PARTS.index(part)
         geom.conaffinity = sum(
-            1 << index for index, other in enumerate(groups) if _counts(group, other)
+            1 << index for index, other in enumerate(PARTS) if apart(part, other)
         )
     model = spec.compile()
     sides = [model.body(body).name.partition("_")[0] for body in model.geom_bodyid]
     return model, np.array([SIDES.index(side) for side in sides])
-
-
-def _part(body: str) -> str:
-    """The finger to which a body of a hand belongs, or the part that is none."""
-    if body == _METACARPAL:
-        return ""
-    return next((finger for finger in FINGER_PREFIXES if body.startswith(finger)), "")
-
-
-def _counts(one: tuple[str, str], other: tuple[str, str]) -> bool:
-    """Whether an overlap of these parts counts: of two hands, or of two fingers of one."""
-    return one[0] != other[0] or (one[1] != other[1] and "" not in (one[1], other[1]))
