@@ -28,6 +28,7 @@ RUN = [
     *sorted(str(page.relative_to(ROOT)) for page in DOCS.glob("tutorials/*.md")),
     "docs/how-to/observation-term.md",
     "docs/how-to/own-player.md",
+    "docs/how-to/real-hands.md",
     "docs/how-to/reward-term.md",
 ]
 
