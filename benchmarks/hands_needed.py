@@ -3,8 +3,8 @@
 Performances are played again and watched at every physics step. Of a group of joints a row has the
 widest range of one joint, and the greatest and the 99th percentile of speeds and efforts over all
 joints and steps. Efforts are those of the actuators; an acceleration is a change of speed from one
-step to the next, over its time. `some_joint_over_hand_speed` is the share of steps in which a joint of
-wrists or fingers is faster than `limits.HAND_SPEED`.
+step to the next, over its time. `some_joint_over_hand_speed` is the share of steps in which a joint
+of wrists or fingers is faster than `limits.HAND_SPEED`.
 """
 
 from __future__ import annotations
