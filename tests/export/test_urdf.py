@@ -139,6 +139,16 @@ def test_shapes_reach_as_far_in_every_direction(both: Both) -> None:
     assert compared > 1000
 
 
+def test_no_shape_of_a_link_is_there_twice(both: Both) -> None:
+    for link in Xml.parse(both.path).iter("link"):
+        for kind in ("visual", "collision"):
+            shapes = [
+                tuple(Xml.tostring(part) for part in (each.find("origin"), each.find("geometry")))
+                for each in link.findall(kind)
+            ]
+            assert len(shapes) == len({*shapes}), link.attrib["name"]
+
+
 def test_it_is_one_tree_without_names_used_twice(both: Both) -> None:
     robot = Xml.parse(both.path).getroot()
     links = [link.attrib["name"] for link in robot.findall("link")]

@@ -149,21 +149,24 @@ def _link(model: mujoco.MjModel, body: int) -> Xml.Element:
         }
         Xml.SubElement(inertial, "inertia", entries)
     first = int(model.body_geomadr[body])
+    # A world may have a shape twice, for what it collides with; here each stands once.
+    seen: set[tuple[str, bytes, bytes]] = set()
     for geom in range(first, first + int(model.body_geomnum[body])):
         touches = model.geom_contype[geom] or model.geom_conaffinity[geom]
         for origin, shape in _shapes(model, geom, shift):
-            visual = Xml.SubElement(link, "visual")
-            visual.append(origin)
-            Xml.SubElement(visual, "geometry").append(shape)
-            Xml.SubElement(
-                Xml.SubElement(visual, "material", name=f"{link.attrib['name']}_{geom}"),
-                "color",
-                rgba=_numbers(model.geom_rgba[geom]),
-            )
-            if touches:
-                collision = Xml.SubElement(link, "collision")
-                collision.append(origin)
-                Xml.SubElement(collision, "geometry").append(shape)
+            for kind in ("visual", "collision") if touches else ("visual",):
+                same = (kind, Xml.tostring(origin), Xml.tostring(shape))
+                if same in seen:
+                    continue
+                seen.add(same)
+                part = Xml.SubElement(link, kind)
+                part.append(origin)
+                Xml.SubElement(part, "geometry").append(shape)
+                if kind == "visual":
+                    name = f"{link.attrib['name']}_{geom}"
+                    colour = _numbers(model.geom_rgba[geom])
+                    material = Xml.SubElement(part, "material", name=name)
+                    Xml.SubElement(material, "color", rgba=colour)
     return link
 
 
