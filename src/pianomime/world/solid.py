@@ -15,11 +15,11 @@ RAIL_SPEED = 2.0
 RAIL_FORCE = 150.0
 """[N] Most that a rail's motor pushes with."""
 JOINT_SPEED = 10.0
-"""[rad/s] No-load speed of the motors of wrists and fingers. A finger of 0.1 m that turns so fast in
-its knuckle alone moves a key's front at 1 m/s, which is forte (see `pianomime.world.touch`)."""
+"""[rad/s] No-load speed of the motors of wrists and fingers. A finger of 0.1 m that turns so fast
+in its knuckle alone moves a key at 1 m/s, which is forte (see `pianomime.world.touch`)."""
 MARGIN = 0.001
-"""[m] Distance at which parts of hands begin to push each other away. A finger of 0.2 m/s moves so
-far in a physics step, and would be as deep in another one before it is noticed."""
+"""[m] Distance between parts of hands at which they begin to push each other away. A finger of
+0.2 m/s moves so far in a physics step, and would be as deep in another one before it is noticed."""
 
 _TOUCHES_KEYS = 1
 """Bit of what collides with keys and with the piano's body."""
@@ -55,7 +55,7 @@ def collide(spec: mujoco.MjSpec) -> None:
             quat=geom.quat,
             contype=_bit(part),
             conaffinity=sum(map(_bit, others)),
-            margin=MARGIN,
+            margin=MARGIN / 2,  # MuJoCo adds those of two geoms.
             group=_INVISIBLE,
             **{name: getattr(geom, name) for name in PARAMETERS["hand"]["contact"]},
         )
