@@ -122,9 +122,10 @@ def test_an_edited_table_is_what_counts(limits: Limits, tmp_path: Path) -> None:
         next(line for line in text.splitlines() if line.startswith(of))
         for of in ("joint,lh_FFJ3,", "actuator,lh_FFJ3,")
     )
-    text = text.replace(joint, "joint,lh_FFJ3,rad,-0.1,,12.5,99")
+    text = text.replace(joint, "joint,lh_FFJ3,rad,-0.1,,12.5")
     text = text.replace(actuator, "actuator,lh_FFJ3,rad,0,1,,0.25")
-    path.write_text(text, "utf-8")
+    # As spreadsheets write it.
+    path.write_text(text, "utf-8-sig", newline="\r\n")
     mine = read_limits(path, limits)
     place = limits.joints.names.index("lh_FFJ3")
     assert (mine.lower[place], mine.upper[place], mine.velocity[place]) == (-0.1, np.inf, 12.5)
@@ -148,6 +149,16 @@ def test_an_edited_table_is_what_counts(limits: Limits, tmp_path: Path) -> None:
         ("joint,rh_FFJ3,rad,-0.261799,", "joint,rh_FFJ3,rad,nan,", "rh_FFJ3 is not a finite"),
         ("joint,rh_FFJ3,rad,-0.261799,", "joint,rh_FFJ3,rad,2,", "rh_FFJ3 leave nothing"),
         ("joint,rh_FFJ3,rad,-0.261799,1.5708,2", "joint,rh_FFJ3,rad,0,1,-2", "leave nothing"),
+        (
+            "joint,rh_FFJ3,rad,-0.261799,1.5708,2,",
+            "joint,rh_FFJ3,rad,0,1,2,3",
+            "joint rh_FFJ3 has no effort",
+        ),
+        (
+            "actuator,rh_FFJ0,rad,0,3.1415,,",
+            "actuator,rh_FFJ0,rad,0,3.1415,5,",
+            "rh_FFJ0 has no velocity",
+        ),
         ("actuator,", "", "no table of limits of these hands"),
     ],
 )

@@ -99,12 +99,14 @@ def test_joints_have_their_limits_and_damping(both: Both) -> None:
         assert float(limit.attrib["velocity"]) == min(limits.velocity[place], 1e6)
 
 
-def reach(model: mujoco.MjModel, data: mujoco.MjData, body: int, way: np.ndarray) -> float:
-    """How far what collides of a body reaches in a direction."""
+def reach(
+    model: mujoco.MjModel, data: mujoco.MjData, body: int, way: np.ndarray, everything: bool
+) -> float:
+    """How far what collides of a body, or also what does not, reaches in a direction."""
     furthest = -np.inf
     first = int(model.body_geomadr[body])
     for geom in range(first, first + int(model.body_geomnum[body])):
-        if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+        if not (everything or model.geom_contype[geom] or model.geom_conaffinity[geom]):
             continue
         turn = data.geom_xmat[geom].reshape(3, 3)
         local, size = turn.T @ way, model.geom_size[geom]
@@ -126,15 +128,22 @@ def reach(model: mujoco.MjModel, data: mujoco.MjData, body: int, way: np.ndarray
     return furthest
 
 
-def test_shapes_reach_as_far_in_every_direction(both: Both) -> None:
+@pytest.mark.parametrize("shown", [False, True])
+def test_shapes_reach_as_far_in_every_direction(both: Both, shown: bool) -> None:
+    if shown:  # What is drawn, too, which MuJoCo leaves out unless it is asked for.
+        text = both.path.read_text("utf-8").replace("<compiler", '<compiler discardvisual="false"')
+        (both.path.parent / "shown.urdf").write_text(text, "utf-8")
+        read = mujoco.MjModel.from_xml_path(str(both.path.parent / "shown.urdf"))
+        assert read.ngeom > both.read.ngeom
+        both = both._replace(read=read)
     draw = np.random.default_rng(1)
-    ours, read = both.pose(draw.uniform(*both.ours.jnt_range.T))
+    ours, its_data = both.pose(draw.uniform(*both.ours.jnt_range.T))
     compared = 0
     for way in draw.normal(size=(20, 3)):
         way /= np.linalg.norm(way)
         for mine, its in both.bodies():
-            far = reach(both.ours, ours, mine, way)
-            assert reach(both.read, read, its, way) == pytest.approx(far, abs=1e-6)
+            far = reach(both.ours, ours, mine, way, shown)
+            assert reach(both.read, its_data, its, way, shown) == pytest.approx(far, abs=1e-6)
             compared += np.isfinite(far)
     assert compared > 1000
 

@@ -15,6 +15,8 @@ from pianomime.export.csv_table import number_text, write_table
 from pianomime.export.limits import Limits
 
 _HEADER = ("of", "name", "unit", "lower", "upper", "velocity [unit/s]", "effort [N m or N]")
+_NOT_OF = {"joint": (6, "actuator"), "actuator": (5, "joint")}
+"""The column that has no limit of a joint, or of an actuator, and what has one there."""
 _LARGEST_FILE = 1_000_000
 """[bytes] A hundred times what such a table has."""
 
@@ -22,7 +24,7 @@ _LARGEST_FILE = 1_000_000
 def write_limits(limits: Limits, path: Path) -> None:
     """Write the limits of joints, and below them those of actuators; no limit is an empty cell.
 
-    The effort of a joint is that of its actuator; an actuator has no limit of velocity of its own.
+    Positions and velocities are limited of joints, targets and efforts of actuators.
 
     Args:
         limits: to be written.
@@ -34,21 +36,20 @@ def write_limits(limits: Limits, path: Path) -> None:
 def read_limits(path: Path, known: Limits) -> Limits:
     """Read a table of limits, such as `write_limits` writes, with other numbers in it.
 
-    What is the effort of a joint is not read: its actuator's counts.
-
     Args:
         path: of the table.
         known: limits of the same joints and actuators.
 
     Raises:
-        InputError: the file is no such table, it is of others, or a limit is no number or leaves
-            nothing between lower and upper.
+        InputError: the file is no such table, it is of others, a limit is no number, leaves
+            nothing between lower and upper, or is one of effort of a joint, or of velocity of an
+            actuator.
         OSError: it cannot be read.
     """
     if path.stat().st_size > _LARGEST_FILE:
         raise InputError(f"{path}: is no table of limits: it is too large")
     try:
-        header, *rows = csv.reader(path.read_text("utf-8").splitlines())
+        header, *rows = csv.reader(path.read_text("utf-8-sig").splitlines())
     except (UnicodeDecodeError, csv.Error, ValueError):
         raise InputError(f"{path}: is no table of limits") from None
     wanted = list(_rows(known))
@@ -56,6 +57,15 @@ def read_limits(path: Path, known: Limits) -> Limits:
         raise InputError(
             f"{path}: is no table of limits of these hands: edit the numbers alone of a limits.csv"
         )
+    # Spreadsheets may leave out empty cells at the end of a row.
+    rows = [row + [""] * (len(_HEADER) - len(row)) for row in rows]
+    for row in rows:
+        column, owner = _NOT_OF[row[0]]
+        if row[column].strip():
+            raise InputError(
+                f"{path}: the {row[0]} {row[1]} has no {_HEADER[column].split()[0]} of its own: "
+                f"limit that of the {owner}"
+            )
     number = np.array([[_number(path, row, column) for column in range(3, 7)] for row in rows])
     lower, upper = np.where(np.isnan(number[:, 0]), -np.inf, number[:, 0]), _or_inf(number[:, 1])
     velocity, effort = _or_inf(number[:, 2]), _or_inf(number[:, 3])
@@ -76,12 +86,11 @@ def read_limits(path: Path, known: Limits) -> Limits:
 
 def _rows(limits: Limits) -> Iterator[tuple[str, ...]]:
     joints = limits.joints
-    effort = limits.effort[joints.mover]
     named = zip(joints.names, joints.units, strict=True)
     for (name, unit), *numbers in zip(
-        named, limits.lower, limits.upper, limits.velocity, effort, strict=True
+        named, limits.lower, limits.upper, limits.velocity, strict=True
     ):
-        yield ("joint", name, unit, *map(number_text, numbers))
+        yield ("joint", name, unit, *map(number_text, numbers), "")
     named = zip(joints.actuators, joints.actuator_units, strict=True)
     for (name, unit), low, high, most in zip(
         named, limits.low, limits.high, limits.effort, strict=True
@@ -91,10 +100,10 @@ def _rows(limits: Limits) -> Iterator[tuple[str, ...]]:
 
 def _number(path: Path, row: list[str], column: int) -> float:
     """A cell, NaN if it is empty."""
+    cell = row[column].strip()
     try:
-        cell = row[column].strip()
         number = float(cell or "nan")
-    except (IndexError, ValueError):
+    except ValueError:
         raise InputError(f"{path}: a limit of {row[1]} is not a number") from None
     if cell and not math.isfinite(number):
         raise InputError(f"{path}: a limit of {row[1]} is not a finite number; leave it empty")
