@@ -120,6 +120,15 @@ def test_settings_that_are_written_otherwise_are_the_same(plays: Counted) -> Non
     assert plays("zero-shot", settings={"planner": {"beam": 91}})
 
 
+def test_another_world(plays: Counted) -> None:
+    assert plays("zero-shot", world="solid")
+    assert not plays("zero-shot", world="solid")
+    assert plays("zero-shot", world="paper")
+    # Its own is the same world, whether it is asked for or not.
+    own = pianomime.load_player("zero-shot").world
+    assert plays("zero-shot") == (own not in ("solid", "paper"))
+
+
 @pytest.mark.parametrize("library", ["daqp", "mujoco", "numpy", "onnxruntime", "scipy"])
 def test_another_version_of_a_library(
     plays: Counted, library: str, monkeypatch: pytest.MonkeyPatch

@@ -37,6 +37,7 @@ from pianomime.learn.envs.config import (
             {"start": "end"},
             "env.episode.start must be one of beginning, anywhere, not 'end'",
         ),
+        (EnvConfig, {"world": "moon"}, "env.world must be one of paper, solid, not 'moon'"),
         (EnvConfig, {"base": "pid"}, "env.base must be one of ik, dynamic, not 'pid'"),
     ],
 )

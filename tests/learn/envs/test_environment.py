@@ -30,6 +30,7 @@ from pianomime.music import frame_metrics
 from pianomime.plan.demonstration import Demonstration
 from pianomime.track import DynamicTracker, IkTracker
 from pianomime.world import World
+from pianomime.world_names import WORLDS, WorldName
 
 ENV = "pianomime.learn:pianomime/Song-v0"
 
@@ -93,12 +94,17 @@ def test_many_are_each_what_one_is_bit_for_bit(
             assert info["f1"] == step.f1[row]
 
 
+@pytest.mark.parametrize("world_name", WORLDS)
 @pytest.mark.parametrize("base", ["ik", "dynamic"])
-def test_no_residual_is_the_base_controller_alone(two_notes: Demonstration, base: str) -> None:
-    batch = SongBatch(two_notes, EnvConfig(base=base), 1)  # type: ignore[arg-type]
+def test_no_residual_is_the_base_controller_alone(
+    two_notes: Demonstration, base: str, world_name: WorldName
+) -> None:
+    config = EnvConfig(world=world_name, base=base)  # type: ignore[arg-type]
+    batch = SongBatch(two_notes, config, 1)
     batch.reset(np.random.default_rng(0))
-    world = World()
-    controller = {"ik": IkTracker, "dynamic": DynamicTracker}[base]().start(two_notes.plan)
+    world = World(world_name)
+    tracker = IkTracker() if base == "ik" else DynamicTracker(world=world_name)
+    controller = tracker.start(two_notes.plan)
     pressed = []
     for frame in range(len(two_notes.plan)):
         step = batch.step(np.zeros((1, 46)))

@@ -288,6 +288,16 @@ def test_configs_go_through_json(kind: str) -> None:
     assert from_json(ExpertConfig, json.loads(json.dumps(to_json(config)))) == config
 
 
+def test_runs_from_before_there_were_two_worlds_are_read_as_they_were() -> None:
+    content = json.loads(json.dumps(to_json(ExpertConfig())))
+    assert "world" not in content["env"]
+    assert from_json(ExpertConfig, content).env.world == "paper"
+    solid = dataclasses.replace(ExpertConfig(), env=EnvConfig(world="solid"))
+    content = json.loads(json.dumps(to_json(solid)))
+    assert content["env"]["world"] == "solid"
+    assert from_json(ExpertConfig, content) == solid
+
+
 @pytest.mark.parametrize(
     "change",
     [
