@@ -158,3 +158,35 @@ def test_wrong_input() -> None:
         batch.set_state(np.zeros((3, 5)))
     with pytest.raises(ValueError, match="cannot make 0 worlds"):
         WorldBatch(0)
+
+
+def test_some_can_be_stepped(controls: NDArray[np.float64]) -> None:
+    """They are worlds as before; the others rest as they are, and nothing is heard of them."""
+    batch, worlds = WorldBatch(WORLDS, 1), [World() for _ in range(WORLDS)]
+    events = 0
+    for number, ctrl in enumerate(controls):
+        ids = np.flatnonzero([True, number % 3 != 1, number % 7 != 2])
+        batch.step(ctrl[ids], pedal=np.array([True, False, True])[ids], ids=ids)
+        heard = batch.key_events
+        assert set(heard.world) <= set(ids)
+        for index in ids:
+            worlds[index].step(ctrl[index], pedal=index != 1)
+            mine = heard.world == index
+            np.testing.assert_array_equal(heard.time[mine], worlds[index].key_events.time)
+            np.testing.assert_array_equal(heard.key[mine], worlds[index].key_events.key)
+            events += mine.sum()
+        assert_same(batch, worlds)
+        np.testing.assert_array_equal(batch.sounding, [world.sounding for world in worlds])
+    assert events > 20
+
+
+def test_broken_physics_in_some_that_are_stepped() -> None:
+    batch = WorldBatch(WORLDS, 1, quiet=True)
+    state = batch.state()
+    qvel = 1 + 142 + 90  # time and positions stand before the velocities in a state
+    state[:, qvel] = 1e12
+    batch.set_state(state)
+    batch.step(np.zeros((2, 46)), ids=[0, 2])
+    np.testing.assert_array_equal(batch.blow_ups, [1, 0, 1])
+    np.testing.assert_array_equal(batch.state()[1], state[1])
+    assert not batch.qpos_hands[[0, 2]].any()

@@ -96,45 +96,53 @@ class WorldBatch(WorldState):
         self._put(start, which)
         self._listen(which)
 
-    def step(self, ctrl: ArrayLike, pedal: ArrayLike = False) -> None:
+    def step(self, ctrl: ArrayLike, pedal: ArrayLike = False, ids: ArrayLike | None = None) -> None:
         """Simulate one frame of 0.05 s with constant controls, or with several, each as long.
 
         Args:
-            ctrl: (B, 46) targets of the position actuators, or (B, S, 46), as in `World.step`
+            ctrl: (n, 46) targets of the position actuators, or (n, S, 46), as in `World.step`
                 [rad, m].
-            pedal: (B,) bool, or one for all.
+            pedal: (n,) bool, or one for all.
+            ids: (n,) indices of the worlds to step; None for all. The others stay as they are, and
+                have no key events.
 
         Raises:
             ValueError: `ctrl` has another shape or is not finite.
         """
-        targets = controls_of_frame(ctrl, 1, len(self), self.model.nu)
-        self.pedal[:] = pedal
-        self._keep_pressed_keys_awake()
+        which = self._which(ids)
+        targets = controls_of_frame(ctrl, 1, len(which), self.model.nu)
+        self.pedal[which] = pedal
+        self._keep_pressed_keys_awake(which)
         self.key_events, hold = NOTHING, SUBSTEPS // len(targets)
         for number, target in enumerate(targets):
-            self._hold(target, hold, number * hold)
+            self._hold(target, hold, number * hold, which)
 
-    def _hold(self, target: NDArray[np.float64], substeps: int, done: int) -> None:
-        """Hold controls for some physics steps, after others in the same step."""
-        before = self.qpos
-        moved = np.empty((2, substeps + 1, len(self), KEYS))
-        moved[:, 0] = before[:, :KEYS], self._velocities()[:, :KEYS]
-        self._batch.bind("ctrl")[:] = target
-        recorded = self._batch.rollout(substeps, record=_RECORDED)
+    def _hold(
+        self, target: NDArray[np.float64], substeps: int, done: int, which: NDArray[np.int64]
+    ) -> None:
+        """Hold controls of some worlds for some physics steps, after others in the same step."""
+        before = self._positions()[which]
+        moved = np.empty((2, substeps + 1, len(which), KEYS))
+        moved[:, 0] = before[:, :KEYS], self._velocities()[which, :KEYS]
+        self._batch.bind("ctrl")[which] = target
+        recorded = self._batch.rollout(substeps, record=_RECORDED, ids=which)
         for quantity, name in enumerate(_RECORDED):
             moved[quantity, 1:] = recorded[name][..., :KEYS].swapaxes(0, 1)
-        broken = self._broken()
-        lost = np.zeros_like(self.sounding)
-        lost[broken], self.sounding[broken] = self.sounding[broken], False
+        broken = self._broken(which)
+        sounding = self.sounding[which]
+        lost = np.zeros_like(sounding)
+        lost[broken], sounding[broken] = sounding[broken], False
         moved[:, 1:, broken] = moved[:, :1, broken]
-        events = sense(moved[0], moved[1], self.sounding)
+        events = sense(moved[0], moved[1], sounding)
+        self.sounding[which] = sounding
         if len(broken):
-            self.blow_ups[broken] += 1
+            self.blow_ups[which[broken]] += 1
             if not self.quiet:
-                which = ", ".join(map(str, broken))
-                warnings.warn(f"{BLOW_UP} (worlds {which})", PhysicsWarning, stacklevel=3)
-            self._put(reset_pose_after_instability(before[broken]), broken)
+                worlds = ", ".join(map(str, which[broken]))
+                warnings.warn(f"{BLOW_UP} (worlds {worlds})", PhysicsWarning, stacklevel=3)
+            self._put(reset_pose_after_instability(before[broken]), which[broken])
             events = events.followed_by(silenced(lost, substeps * PHYSICS_DT))
+        events = events._replace(world=which[events.world])
         self.key_events = self.key_events.followed_by(events.later(done * PHYSICS_DT))
 
     def state(self) -> NDArray[np.float64]:
@@ -182,6 +190,7 @@ class WorldBatch(WorldState):
         self._batch.bind("qpos")[which] = qpos
         self._batch.forward(which)
 
-    def _broken(self) -> NDArray[np.int64]:
-        reset = self._batch.warning[:, RESETS, _NUMBER].any(axis=1)
-        return np.flatnonzero(reset | ~np.isfinite(self._positions()).all(axis=1))
+    def _broken(self, which: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which of some worlds broke in their last physics steps, counted among them."""
+        reset = self._batch.warning[which][:, RESETS, _NUMBER].any(axis=1)
+        return np.flatnonzero(reset | ~np.isfinite(self._positions()[which]).all(axis=1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from types import EllipsisType
 
 import mujoco
 import numpy as np
@@ -71,15 +72,20 @@ class WorldState(ABC):
         """(..., 88) bool: keys that sound, within 0.5 degrees of their stop."""
         return pressed(self._positions())
 
-    def _keep_pressed_keys_awake(self) -> None:
+    def _keep_pressed_keys_awake(self, which: EllipsisType | NDArray[np.int64] = ...) -> None:
         """Keep pressed keys awake.
 
         MuJoCo puts a body that does not move to sleep. A key held down would fall asleep, and stay
         down after its release.
+
+        Args:
+            which: (n,) indices of worlds; `...` for all, or for the only one.
         """
-        down = self._positions()[..., :KEYS] > _DOWN
-        velocity = self._velocities()[..., :KEYS]
+        keys = which, slice(KEYS)
+        down = self._positions()[keys] > _DOWN
+        velocity = self._velocities()[keys]
         velocity[down & (np.abs(velocity) < _AWAKE)] = -_AWAKE
+        self._velocities()[keys] = velocity
 
     @abstractmethod
     def _positions(self) -> NDArray[np.float64]:
