@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree as Xml
@@ -46,18 +47,31 @@ def both(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return Both(ours, mujoco.MjModel.from_xml_path(str(path)), path)
 
 
-def test_links_are_where_bodies_are(both: Both) -> None:
+def check_links(both: Both, poses: int) -> None:
+    """Every link is at the joint of its body, and turned as the body, in random poses."""
     draw = np.random.default_rng(0)
     mine, its = np.array(both.bodies()).T
-    # A link is at its joint.
     hinged = both.ours.body_jntnum[mine] == 1
     joint = both.ours.body_jntadr[mine[hinged]]
-    for _ in range(100):
+    for _ in range(poses):
         ours, read = both.pose(draw.uniform(*both.ours.jnt_range.T))
         at = ours.xpos[mine]
         at[hinged] = ours.xanchor[joint]
         np.testing.assert_allclose(read.xpos[its], at, atol=1e-9)
         np.testing.assert_allclose(read.xmat[its], ours.xmat[mine], atol=1e-9)
+
+
+def test_links_are_where_bodies_are(both: Both) -> None:
+    check_links(both, poses=100)
+
+
+def test_joints_need_not_be_at_the_origins_of_bodies(tmp_path: Path) -> None:
+    ours = copy.copy(world_model())
+    hinges = ours.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
+    ours.jnt_pos[hinges] += np.random.default_rng(2).normal(0, 0.01, (hinges.sum(), 3))
+    write_urdf(ours, tmp_path / "world.urdf")
+    read = mujoco.MjModel.from_xml_path(str(tmp_path / "world.urdf"))
+    check_links(Both(ours, read, tmp_path / "world.urdf"), poses=5)
 
 
 def test_masses_and_inertia_are_the_same(both: Both) -> None:
