@@ -49,7 +49,7 @@ def test_a_folder_of_odd_names_is_evaluated(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Whatever is edited meanwhile: results are found by the names of songs.
-    monkeypatch.setattr("pianomime.evaluation.evaluation._program_hash", lambda: "")
+    monkeypatch.setattr("pianomime.evaluation.evaluation.program_hash", lambda: "")
     songs = make_songs(tmp_path / "songs")
     broken = tmp_path / "songs" / os.fsdecode(b"\x1b[31mbroken\xff|.mid")
     broken.write_bytes(b"this is no music")

@@ -37,6 +37,7 @@ class Evaluate:
       pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
       pianomime evaluate FOLDER --lead-in 0.5
       pianomime evaluate FOLDER --world solid
+      pianomime evaluate FOLDER --lead-in 0.5 --robust
       pianomime evaluate DEMO.npz DEMOS/*.npz --player demonstration
       pianomime evaluate FOLDER --player my_module:make_player --planner.beam 200
     """
@@ -70,6 +71,9 @@ class Evaluate:
     real time only between runs with the same N."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Seed of everything that is random."""
+    robust: bool = False
+    """Play what was found again in worlds that differ from the one that the player knows, as it is
+    and with feedback; OUT then holds robust.md, robust.csv and robust.json as well."""
     out: Annotated[
         Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
     ] = None
@@ -84,6 +88,7 @@ class Evaluate:
         """
         from pianomime.commands.progress import bars
         from pianomime.evaluation.evaluation import evaluate
+        from pianomime.evaluation.robustness import robust_markdown, robustness
         from pianomime.evaluation.table import markdown
         from pianomime.file_names import file_name
         from pianomime.shown import command_word, shown
@@ -107,7 +112,12 @@ class Evaluate:
                 out=out,
                 progress=progress,
             )
+            robust = None
+            if self.robust:
+                robust = robustness(results, out, jobs=self.jobs, progress=progress)
         print(markdown(results))
+        if robust is not None:
+            print(robust_markdown(robust))
         print(f"saved: {shown(out / 'results.json')}")
         kept = [row for row in results["songs"] if "performance" in row]
         if kept:

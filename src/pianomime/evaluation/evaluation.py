@@ -130,7 +130,7 @@ def evaluate(
         files = files_digest(player_files(str(player)))
         part = f"{seconds:g}", float(lead_in)
         key = [str(player), effort, seed, plays_in, chosen, *part, files, protocol_digest()]
-        made_by = f"{json.dumps(key, sort_keys=True)} {_program_hash()}"
+        made_by = f"{json.dumps(key, sort_keys=True)} {program_hash()}"
     store = None if out is None else _Store(Path(out), made_by)
     with nullcontext() if store is None else store.held():
         rows: dict[Path, Row] = {}
@@ -332,7 +332,7 @@ def _json(content: dict[str, Any]) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _program_hash() -> str:
+def program_hash() -> str:
     """Changes with our code, its parameters and its libraries: no older result is reused."""
     digest = hashlib.sha256()
     for library in _LIBRARIES:

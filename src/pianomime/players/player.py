@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +14,12 @@ from pianomime.music import Score
 from pianomime.plan import Planner
 from pianomime.players.performance import Performance
 from pianomime.players.rollout import rollout
+from pianomime.players.sounding_notes import SoundingNotes
 from pianomime.progress import Progress, no_progress, telling
 from pianomime.short_repr import short_repr
 from pianomime.track import Controller, PedalController, Tracker
 from pianomime.world import World
-from pianomime.world.key_sensor import KeyEvents
 from pianomime.world.layout import LAYOUT
-from pianomime.world.parameters import PHYSICS_DT
 from pianomime.world.touch import DEFAULT_TOUCH
 from pianomime.world_names import PAPER
 
@@ -87,7 +84,7 @@ class Player(ABC):
         pressed = np.empty((frames, KEYS), bool)
         pedal = np.empty(frames, bool)
         blow_ups = np.zeros(frames, np.int64)
-        world, notes = World(self.world), _SoundingNotes()
+        world, notes = World(self.world), SoundingNotes()
         for step in rollout(controller, world, score.pedal_roll()):
             frame = step.frame
             ctrl.append(np.atleast_2d(step.ctrl))
@@ -117,35 +114,6 @@ class Player(ABC):
             plan_seconds=planned - began,
             simulate_seconds=time.perf_counter() - planned,
         )
-
-
-class _SoundingNotes:
-    """Makes notes of what keys sense, frame after frame."""
-
-    def __init__(self) -> None:
-        self._notes: list[list[float]] = []  # key, on, off, speed
-        self._last: dict[int, list[float]] = {}  # of each key
-
-    def add(self, events: KeyEvents, begin: float) -> None:
-        """Add the events of a frame that begins at a time [s]."""
-        for _, key, on, after, speed in zip(*map(np.ndarray.tolist, events), strict=True):
-            if on:
-                self._last[key] = [key, begin + after, math.inf, speed]
-                self._notes.append(self._last[key])
-            else:
-                self._last[key][2] = begin + after
-
-    def arrays(self, end: float) -> dict[str, NDArray[Any]]:
-        """The events of a `Performance` that ends at a time [s]."""
-        notes = np.array(sorted(self._notes, key=lambda note: note[1])).reshape(-1, 4)
-        key, on, off, speed = notes.T
-        # A key that sounds in the very last moment lasts a moment.
-        return {
-            "event_key": key.astype(np.int64),
-            "event_on": on,
-            "event_off": np.maximum(np.minimum(off, end), on + PHYSICS_DT),
-            "event_speed": speed,
-        }
 
 
 def _intervals(pedal: NDArray[np.bool_]) -> NDArray[np.float64]:

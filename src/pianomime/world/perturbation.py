@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import KEYS
-from pianomime.validation import above_zero, finite, within
+from pianomime.validation import above_zero, within
 from pianomime.world.layout import LAYOUT
 from pianomime.world.model import SIDES, world_model
 from pianomime.world.parameters import PHYSICS_DT
@@ -22,6 +22,8 @@ from pianomime.world_names import PAPER
 
 _PIANO = "piano"
 """The body that carries all keys."""
+_FAR_ASIDE = 0.05
+"""[m] Farther the keys are not: two keys to the side, it would be another piece."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Perturbation:
             InputError: a factor is not above 0, a noise or the delay is negative, or a number is
                 not finite.
         """
-        finite(self)
+        within("keys_aside", self.keys_aside, -_FAR_ASIDE, _FAR_ASIDE)
         for name in ("friction", "hand_mass", "gain", "key_stiffness"):
             above_zero(name, getattr(self, name))
         for name in ("joint_noise", "slide_noise", "delay"):
@@ -142,10 +144,14 @@ class Sensors:
     Args:
         perturbation: how noisy they are.
         seed: of the noise.
+
+    Attributes:
+        joint_noise: standard deviation of the measured angles [rad].
     """
 
     def __init__(self, perturbation: Perturbation, seed: int = 0) -> None:
-        one = np.full(LAYOUT.hand_joints, perturbation.joint_noise)
+        self.joint_noise = perturbation.joint_noise
+        one = np.full(LAYOUT.hand_joints, self.joint_noise)
         one[LAYOUT.slides] = perturbation.slide_noise
         self._spread = np.tile(one, len(SIDES))
         self._rng = np.random.default_rng(seed)
