@@ -14,9 +14,9 @@ RAIL_SPEED = 2.0
 """[m/s] No-load speed of the motors of the forearms' rails."""
 RAIL_FORCE = 150.0
 """[N] Most that a rail's motor pushes with."""
-JOINT_SPEED = 10.0
-"""[rad/s] No-load speed of the motors of wrists and fingers. A finger of 0.1 m that turns so fast
-in its knuckle alone moves a key at 1 m/s, which is forte (see `pianomime.world.touch`)."""
+JOINT_SPEED = 15.0
+"""[rad/s] No-load speed of the motors of wrists and fingers. A third of the force is left at 10
+rad/s, with which a finger of 0.1 m moves a key at 1 m/s: forte (see `pianomime.world.touch`)."""
 MARGIN = 0.001
 """[m] Distance between parts of hands at which they begin to push each other away. A finger of
 0.2 m/s moves so far in a physics step, and would be as deep in another one before it is noticed."""
