@@ -3,7 +3,9 @@
 Plays random scores, whose notes are anywhere on the keyboard and too many for ten fingers, and
 MIDI files if any are named. Each is played in one pass (effort 0) and watched at every physics
 step. A break is counted (`blow_ups`); so is every frame in which hands or fingers of a hand are
-inside each other by over 1 mm. Maxima are those of all scores.
+inside each other by over 1 mm. Maxima are those of all scores. All controls are then played again
+in both worlds, in turns: `speed` is how many steps the world makes in the CPU time of one of the
+paper's.
 
     python benchmarks/solid.py --scores 1000
     python benchmarks/solid.py --scores 0 FOLDER/*.mid
@@ -12,6 +14,7 @@ inside each other by over 1 mm. Maxima are those of all scores.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,7 +24,8 @@ import common
 from pianomime import Performance, Score, excerpt, load_player
 from pianomime.keyboard import KEYS
 from pianomime.players.body import BodyMetrics, body_metrics
-from pianomime.world_names import WORLDS
+from pianomime.world import World
+from pianomime.world_names import PAPER, WORLDS
 
 _NOTES_A_SECOND = 20.0
 _LONGEST = 1.0
@@ -55,6 +59,15 @@ def scores(count: int, songs: list[Path], seconds: float) -> Iterator[Score]:
         yield excerpt(Score.from_midi(song), seconds=seconds)
 
 
+def replay_seconds(performance: Performance, world_name: str) -> float:
+    """CPU seconds that the controls of a performance take in a world."""
+    world = World(world_name, quiet=True)
+    began = time.process_time()
+    for ctrl in performance.ctrl:
+        world.step(ctrl)
+    return time.process_time() - began
+
+
 def main() -> None:
     parser = common.parser("solid", __doc__)
     parser.add_argument("songs", nargs="*", type=Path, metavar="SONG.mid")
@@ -69,6 +82,7 @@ def main() -> None:
     frames = blow_ups = 0
     overlaps = dict.fromkeys(("hands_overlap", "fingers_overlap"), 0.0)
     maxima = dict.fromkeys(_MAXIMA, 0.0)
+    seconds = dict.fromkeys((PAPER, options.world), 0.0)
     for number, score in enumerate(scores(options.scores, options.songs, options.seconds), 1):
         performance = player.play(score)
         body = body_metrics(performance)
@@ -79,10 +93,14 @@ def main() -> None:
             overlaps[name] += _number(body, name) * len(performance)
         for name in maxima:
             maxima[name] = max(maxima[name], _number(body, name))
+        for name in seconds:
+            seconds[name] += replay_seconds(performance, name)
         if number % 10 == 0 or number == total or len(performance.blow_ups):
             print(f"{number}/{total}: {_told(performance)}, {blow_ups} blow-ups so far", flush=True)
     shares = {name: value / max(frames, 1) for name, value in overlaps.items()}
-    results = {"scores": total, "frames": frames, "blow_ups": blow_ups, **shares, **maxima}
+    counts = {"scores": total, "frames": frames, "blow_ups": blow_ups}
+    speed = seconds[PAPER] / seconds[options.world]
+    results = {**counts, **shares, **maxima, "speed": speed}
     common.table(["", options.world], [[name, value] for name, value in results.items()])
     common.report(options.output, facts, {"world": options.world, **results})
 

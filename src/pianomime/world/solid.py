@@ -10,8 +10,9 @@ import mujoco
 from pianomime.world.hand_parts import PALM, PARTS, Part, apart, part_of
 from pianomime.world.parameters import PARAMETERS
 
-RAIL_SPEED = 2.0
-"""[m/s] No-load speed of the motors of the forearms' rails."""
+RAIL_SPEED = 1.9
+"""[m/s] No-load speed of the motors of the forearms' rails. With what collisions and the reactions
+of fingers add, rails stay below 2 m/s."""
 RAIL_FORCE = 150.0
 """[N] Most that a rail's motor pushes with."""
 JOINT_SPEED = 15.0
