@@ -112,30 +112,20 @@ class NoteCost:
             are missed, strikes that nobody wanted, and those that are more off than `notice`.
             Keys that are wrong at the end of a frame, and nothing else, are not among it.
         """
-        config, done = self._config, set(self._done)
-        end = (first + count) * FRAME_SECONDS
-        cost = 0.0
-        wrong: list[tuple[int, int]] = []
+        tally = self.tally(first)
         for step, frame in enumerate(frames):
-            for strike in frame.strikes:
-                wanted = self._wanted(strike, done)
-                if wanted is not None:
-                    done.add(wanted)
-                if step >= count:
-                    continue
-                each = config.phantom if wanted is None else self._off(strike, wanted)
-                cost += each
-                if wanted is None or each > config.notice:
-                    wrong.append((step, strike.key))
-            if step < count:
-                cost += config.frame * float((frame.pressed != self._goal[first + step]).sum())
-        begin, stop = np.searchsorted(self._onset, [first * FRAME_SECONDS - _OPEN, end - _AHEAD])
-        for wanted in range(begin, stop):
-            if wanted not in done:
-                cost += self._missed[wanted]
-                step = int(self._onset[wanted] / FRAME_SECONDS) - first
-                wrong.append((min(max(step, 0), len(frames) - 1), self._key[wanted]))
-        return cost, wrong
+            tally.add(frame, counts=step < count)
+        return tally.total(), tally.wrong + [
+            (min(max(step, 0), len(frames) - 1), key) for step, key in tally.missed()
+        ]
+
+    def tally(self, first: int) -> Tally:
+        """The cost of frames that are added one after the other.
+
+        Args:
+            first: number of the first frame.
+        """
+        return Tally(self, first)
 
     def _wanted(self, strike: Strike, done: set[int]) -> int | None:
         """The strike that this one is: the nearest of its key that has not come yet."""
@@ -153,6 +143,84 @@ class NoteCost:
         velocity = int(self._touch.velocity_of(strike.speed, strike.key))
         steps = max(abs(velocity - self._velocity[wanted]) - 4, 0) / 12
         return self._config.late * min(late, 1.5) + self._config.touch * min(steps, 1.5)
+
+    def _open(self, first: int, end: float, done: set[int]) -> list[int]:
+        """Strikes that have not come, with onsets from a frame on, but before `end` [s]."""
+        begin = first * FRAME_SECONDS - _OPEN
+        between = np.searchsorted(self._onset, [begin, end])
+        return [wanted for wanted in range(*between.tolist()) if wanted not in done]
+
+
+class Tally:
+    """The cost of some frames, as they are heard.
+
+    Attributes:
+        wrong: what went wrong so far but for notes that are missed, as of `NoteCost.of`.
+
+    Args:
+        cost: of what is heard, given what was heard before.
+        first: number of the first frame.
+    """
+
+    def __init__(self, cost: NoteCost, first: int) -> None:
+        self._of, self._first, self._frames, self._heard = cost, first, 0, 0.0
+        self._done = set(cost._done)
+        self.wrong: list[tuple[int, int]] = []
+
+    def add(self, frame: Frame, counts: bool = True) -> None:
+        """What is heard in the next frame.
+
+        Args:
+            frame: that follows those before.
+            counts: whether it costs; else it only shows what still comes.
+        """
+        cost, config, step = self._of, self._of._config, self._frames
+        for strike in frame.strikes:
+            wanted = cost._wanted(strike, self._done)
+            if wanted is not None:
+                self._done.add(wanted)
+            if not counts:
+                continue
+            each = config.phantom if wanted is None else cost._off(strike, wanted)
+            self._heard += each
+            if wanted is None or each > config.notice:
+                self.wrong.append((step, strike.key))
+        if counts:
+            self._heard += config.frame * float(
+                (frame.pressed != cost._goal[self._first + step]).sum()
+            )
+            self._frames += 1
+
+    @property
+    def least(self) -> float:
+        """What it costs at least, whatever is heard after it."""
+        past = (self._first + self._frames) * FRAME_SECONDS - self._of._config.match
+        return self._heard + sum(self._missing(past))
+
+    def total(self) -> float:
+        """What it costs if nothing is heard after it."""
+        cost = self._heard
+        for each in self._missing(self._end):
+            cost += each
+        return cost
+
+    def missed(self) -> list[tuple[int, int]]:
+        """Notes that are missed, as frames counted from the first, and keys."""
+        cost = self._of
+        return [
+            (int(cost._onset[wanted] / FRAME_SECONDS) - self._first, cost._key[wanted])
+            for wanted in cost._open(self._first, self._end, self._done)
+        ]
+
+    @property
+    def _end(self) -> float:
+        """[s] Strikes that have not come until then are missed."""
+        return (self._first + self._frames) * FRAME_SECONDS - _AHEAD
+
+    def _missing(self, end: float) -> list[float]:
+        """The costs of strikes that should have come before [s]."""
+        missing = self._of._open(self._first, end, self._done)
+        return [self._of._missed[wanted] for wanted in missing]
 
 
 def strikes_in(events: KeyEvents, begin: float, world: int = 0) -> list[Strike]:

@@ -18,17 +18,14 @@ from numpy.typing import NDArray
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.track.keystroke import KeystrokeController
-from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, Strike, strikes_in
+from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
+from pianomime.track.note_rollouts import Rollouts, Start, keys_of
 from pianomime.track.rehearsal import KeystrokeStarter
 from pianomime.track.variations import VariationConfig, Variations
 from pianomime.validation import within
-from pianomime.world import World, WorldBatch
+from pianomime.world import World
+from pianomime.world.layout import LAYOUT
 from pianomime.world.touch import TOUCHES
-
-_SHORT = 0.01
-"""Cost of a key's way to where it should be: keys that are nearly right are better."""
-_BROKEN = 100.0
-"""Cost of physics that breaks."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +46,9 @@ class NoteSamplingConfig(VariationConfig):
     """Frames that are looked ahead."""
     trigger: float = 0.6
     """Cost of the next frames above which variations are tried; also where a note is wrong."""
+    apart: float = 0.04
+    """Distance between the fingers of both hands along the keyboard from which on a hand that alone
+    is varied is simulated alone [m]."""
     cost: NoteCostConfig = field(default_factory=NoteCostConfig)
     """What an ear minds."""
 
@@ -91,10 +91,17 @@ class NoteSamplingTracker:
 
 
 class _Step(NamedTuple):
-    """A frame that was looked ahead: its controls (S, 46), and what was heard."""
+    """A frame that was looked ahead.
+
+    Attributes:
+        ctrl: (S, 46) its controls.
+        frame: what was heard.
+        hands: (54,) joint positions of both hands at its end [rad, m].
+    """
 
     ctrl: NDArray[np.float64]
     frame: Frame
+    hands: NDArray[np.float64]
 
 
 class NoteSamplingController:
@@ -104,7 +111,6 @@ class NoteSamplingController:
 
     Attributes:
         plan: what is followed.
-        steps: frames that were simulated to look ahead so far.
 
     Args:
         base: the controller to improve.
@@ -117,15 +123,15 @@ class NoteSamplingController:
     def __init__(
         self, base: KeystrokeController, config: NoteSamplingConfig, threads: int = 0
     ) -> None:
-        self.config, self.plan, self.steps = config, base.plan, 0
-        self._base = base
-        self._goal = base.plan.keys()
+        self.config, self.plan = config, base.plan
+        self._base, self._followed = base, 0
+        goal = base.plan.keys()
         stroke = base.config.stroke
         wanted = replace(base.strikes, velocity=stroke.velocities(base.strikes))
-        self._cost = NoteCost(wanted, self._goal, TOUCHES[stroke.touch], config.cost)
+        self._cost = NoteCost(wanted, goal, TOUCHES[stroke.touch], config.cost)
         self._variations = Variations(base.plan, config)
-        self._batch = WorldBatch(config.variations, threads, quiet=True, model=base.world)
-        self._chosen: list[_Step] = []
+        self._rollouts = Rollouts(self._cost, goal, config.variations, threads, base.world)
+        self._chosen: list[NDArray[np.float64]] = []
         self._known: list[_Step] = []
         self._ahead: World | None = None
 
@@ -134,6 +140,16 @@ class NoteSamplingController:
         """Number of controls that follow one another in a frame."""
         return self._base.controls_per_frame
 
+    @property
+    def steps(self) -> int:
+        """Number of frames that were simulated to look ahead so far."""
+        return self._followed + self._rollouts.steps
+
+    @property
+    def steps_alone(self) -> int:
+        """Of these, the number in which one hand alone was simulated."""
+        return self._rollouts.alone
+
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) the control found.
 
@@ -141,38 +157,48 @@ class NoteSamplingController:
             frame: number of the control, of which a frame has `controls_per_frame`.
             world: as it is before it.
         """
-        number, part = divmod(frame, self.controls_per_frame)
+        parts = self.controls_per_frame
+        number, part = divmod(frame, parts)
+        self._cost.heard(strikes_in(world.key_events, (frame - 1) / parts * FRAME_SECONDS))
         if part == 0:
-            if number:
-                self._cost.heard(self._chosen.pop(0).frame.strikes)
-            if not self._chosen:
-                self._chosen = self._choose(number, world)
-        control: NDArray[np.float64] = self._chosen[0].ctrl[part]
+            self._chosen = self._chosen[1:] or self._choose(number, world)
+        control: NDArray[np.float64] = self._chosen[0][part]
         return control
 
-    def _choose(self, first: int, world: World) -> list[_Step]:
-        """The next frames to be played."""
+    def _choose(self, first: int, world: World) -> list[NDArray[np.float64]]:
+        """The controls (S, 46) of each of the next frames to be played."""
         config = self.config
         frames = min(config.ahead, len(self.plan) - first)
         commit = min(config.commit, frames)
         known = self._look_ahead(first, frames, world)
         heard = [step.frame for step in known]
-        cost, wrong = self._cost.of(first, heard, min(commit + 2, frames))
-        if not wrong and cost < config.trigger:
-            self._known = known[commit:]
-            return known[:commit]
-        self._ahead = None
+        cost, soon = self._cost.of(first, heard, min(commit + 2, frames))
         _, wrong = self._cost.of(first, heard, frames)
+        # Where many keys are a little wrong, but nothing else, there is no finger to blame.
+        if not wrong or (not soon and cost < config.trigger):
+            self._known = known[commit:]
+            return [step.ctrl for step in known[:commit]]
+        self._ahead = None
         probability = self._variations.probabilities(first, wrong)
-        ctrl = np.array([step.ctrl for step in known])
+        start = self._start(first, world, known, probability)
+        best = self._rollouts.best(start, np.array([[step.ctrl for step in known]]))
         for _ in range(config.rounds):
             drawn = self._variations.draw(frames, probability, self.controls_per_frame)
-            tries = ctrl + drawn.reshape(-1, *ctrl.shape)
-            tries[0] = ctrl
-            costs, played = self._roll_out(first, world, tries)
-            best = int(np.argmin(costs))
-            ctrl, heard = tries[best], played[best]
-        return [_Step(*step) for step in zip(ctrl[:commit], heard[:commit], strict=True)]
+            # The first is the best so far.
+            tries = best.ctrl + drawn[1:].reshape(-1, *best.ctrl.shape)
+            best = self._rollouts.best(start, tries, best)
+        return list(best.ctrl[:commit])
+
+    def _start(
+        self, first: int, world: World, known: list[_Step], probability: NDArray[np.float64]
+    ) -> Start:
+        """Whence variations are rolled out: with both hands, or with the one that is varied."""
+        start = self._rollouts.start(first, world, [step.frame for step in known])
+        varied = [hand for hand, range_ in enumerate(LAYOUT.actuators) if probability[range_].any()]
+        if len(varied) != 1:
+            return start
+        keys = keys_of(varied[0], np.array([step.hands for step in known]), self.config.apart)
+        return start if keys is None else self._rollouts.start_alone(start, varied[0], keys)
 
     def _look_ahead(self, first: int, frames: int, world: World) -> list[_Step]:
         """What the base controller does in the next frames."""
@@ -186,29 +212,8 @@ class NoteSamplingController:
                 self._ahead.step(ctrl[-1], parts=parts)
                 begin = (number + part / parts) * FRAME_SECONDS
                 strikes += strikes_in(self._ahead.key_events, begin)
-            known.append(_Step(np.array(ctrl), Frame(strikes, self._ahead.pressed)))
-            self.steps += 1
+            known.append(
+                _Step(np.array(ctrl), Frame(strikes, self._ahead.pressed), self._ahead.qpos_hands)
+            )
+            self._followed += 1
         return known
-
-    def _roll_out(
-        self, first: int, world: World, tries: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], list[list[Frame]]]:
-        """(B,) Costs of controls (B, H, S, 46), and what is heard with each."""
-        batch, frames = self._batch, tries.shape[1]
-        batch.set_state(world.state())
-        batch.sounding[:] = world.sounding
-        played: list[list[Frame]] = [[] for _ in tries]
-        cost = np.zeros(len(tries))
-        for step in range(frames):
-            batch.step(tries[:, step])
-            down, events = batch.pressed, batch.key_events
-            heard: list[list[Strike]] = [[] for _ in tries]
-            begin = (first + step) * FRAME_SECONDS
-            for index in np.unique(events.world):
-                heard[index] = strikes_in(events, begin, index)
-            for index, frame in enumerate(played):
-                frame.append(Frame(heard[index], down[index]))
-            cost += _SHORT * np.abs(batch.key_state - self._goal[first + step]).sum(axis=1)
-        self.steps += len(tries) * frames
-        cost += [self._cost.of(first, frame, frames)[0] for frame in played]
-        return cost + _BROKEN * batch.blow_ups, played

@@ -1,0 +1,157 @@
+"""Roll-outs: the best of many is found though losers end early, and one hand may stand for both."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from heard import notes, plan_of
+from pianomime.keyboard import FRAME_SECONDS, KEYS
+from pianomime.plan import FingertipPlan
+from pianomime.track import KeystrokeTracker
+from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
+from pianomime.track.note_rollouts import Rollouts, keys_of
+from pianomime.world import World
+from pianomime.world.key_sensor import NOTHING
+from pianomime.world.layout import LAYOUT
+from pianomime.world.parameters import key_centres
+from pianomime.world.touch import TOUCHES
+
+FIRST, FRAMES = 6, 5
+FAR = notes([20, 24, 60, 64], [0.0, 0.15, 0.0, 0.15])
+"""The hands are far from each other."""
+
+
+@cache
+def scene() -> tuple[FingertipPlan, World, NDArray[np.float64], list[Frame], NDArray[np.float64]]:
+    """Some frames in which notes are played: the world before them, controls, what is heard."""
+    plan = plan_of(FAR)
+    base, world = KeystrokeTracker().start(plan), World()
+    for number in range(5 * FIRST):
+        world.step(base.control(number, world), parts=5)
+    ahead = world.copy()
+    ctrl, heard, hands = [], [], []
+    for frame in range(FIRST, FIRST + FRAMES):
+        strikes = []
+        for number in range(5 * frame, 5 * frame + 5):
+            ctrl.append(base.control(number, ahead))
+            ahead.step(ctrl[-1], parts=5)
+            strikes += strikes_in(ahead.key_events, number * FRAME_SECONDS / 5)
+        heard.append(Frame(strikes, ahead.pressed))
+        hands.append(ahead.qpos_hands)
+    return plan, world, np.array(ctrl).reshape(FRAMES, 5, 46), heard, np.array(hands)
+
+
+def cost_of(plan: FingertipPlan) -> NoteCost:
+    assert plan.strikes is not None
+    return NoteCost(plan.strikes, plan.keys(), TOUCHES["goebl-bresin"], NoteCostConfig())
+
+
+def rollouts(most: int) -> Rollouts:
+    plan = scene()[0]
+    return Rollouts(cost_of(plan), plan.keys(), most, 1, "paper")
+
+
+def varied(hand: int, count: int) -> NDArray[np.float64]:
+    """Controls of which those of one hand vary, ever more."""
+    _, _, ctrl, _, _ = scene()
+    more = np.zeros((count, 1, 1, LAYOUT.ctrl_size))
+    drawn = np.random.default_rng(3).normal(0, 0.05, (count, 1, 1, LAYOUT.hand_actuators))
+    more[..., LAYOUT.actuators[hand]] = drawn
+    more[..., LAYOUT.actuators[hand]][..., LAYOUT.slide_actuators] = 0.0
+    return ctrl + more
+
+
+def test_losers_end_early_and_the_best_is_the_same() -> None:
+    _, world, ctrl, known, _ = scene()
+    tries = np.concatenate([ctrl[None], 4 * varied(1, 6) - 3 * ctrl])
+    found = rollouts(7)
+    start = found.start(FIRST, world, known)
+    each = [rollouts(7).best(start._replace(batch=found._batch), one[None]) for one in tries]
+    best = min(each, key=lambda one: one.cost)
+    assert max(one.cost for one in each) > best.cost + 1, "some have to be worse"
+    first = found.best(start, tries[:1])
+    before = found.steps
+    again = found.best(start, tries[1:], first)
+    assert found.steps - before < 6 * FRAMES
+    np.testing.assert_array_equal(again.ctrl, best.ctrl)
+    assert again.cost == best.cost
+    assert again.heard[-1].strikes == best.heard[-1].strikes
+    # Of the same cost, what is known stays.
+    assert found.best(start, again.ctrl[None], again) is again
+    assert found.best(start, tries[:0], again) is again
+
+
+@pytest.mark.parametrize("hand", [0, 1])
+def test_one_hand_alone_is_heard_as_both_are(hand: int) -> None:
+    _, world, ctrl, known, hands = scene()
+    found = rollouts(4)
+    start = found.start(FIRST, world, known)
+    keys = keys_of(hand, hands, 0.05)
+    assert keys is not None
+    alone = found.start_alone(start, hand, keys)
+    assert found.alone == 0
+    for one in (ctrl, *varied(hand, 3)):
+        both, mine = found.best(start, one[None]), found.best(alone, one[None])
+        for whole, part in zip(both.heard, mine.heard, strict=True):
+            np.testing.assert_array_equal(part.pressed, whole.pressed)
+            wanted, heard = sorted(whole.strikes), sorted(part.strikes)
+            assert [strike.key for strike in heard] == [strike.key for strike in wanted]
+            np.testing.assert_allclose(
+                [strike.time for strike in heard], [strike.time for strike in wanted], atol=2e-3
+            )
+    assert any(frame.strikes for frame in mine.heard)
+    assert found.alone == 4 * FRAMES
+    assert found.steps == 8 * FRAMES
+
+
+def test_keys_are_parted_half_way_between_the_hands() -> None:
+    hands = scene()[4]
+    low, high = (keys_of(hand, hands, 0.05) for hand in (0, 1))
+    assert low is not None
+    np.testing.assert_array_equal(low, ~high)
+    assert low[[20, 24]].all()
+    assert not low[[60, 64]].any()
+    assert (np.diff(key_centres()[low, 1]) > 0).all()
+    assert keys_of(0, hands, 1.0) is None
+    together = hands.copy()
+    for index, sign in ((0, 1), (1, -1)):
+        together[:, LAYOUT.among_hands(index)][:, LAYOUT.slide] += 0.25 * sign
+    assert keys_of(1, together, 0.05) is None
+
+
+class Told:
+    """A batch of worlds that is told what its keys do."""
+
+    def __init__(self, key_state: NDArray[np.float64], blow_ups: list[int]) -> None:
+        self.key_state, self.blow_ups = key_state, np.array(blow_ups)
+        self.pressed = np.zeros(key_state.shape, bool)
+        self.sounding = np.zeros(key_state.shape, bool)
+        self.key_events = NOTHING
+
+    def set_state(self, state: NDArray[np.float64], ids: NDArray[np.int64]) -> None:
+        pass
+
+    def step(self, ctrl: NDArray[np.float64], ids: NDArray[np.int64]) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("down", "broken", "cost"), [(0.0, 0, 0.0), (0.4, 0, 2 * 0.01 * 0.4), (0.0, 1, 100.0)]
+)
+def test_keys_on_their_way_and_broken_physics_cost(down: float, broken: int, cost: float) -> None:
+    state, world = np.zeros((1, KEYS)), World()
+    state[0, 40] = down
+    found, nothing = rollouts(1), Frame([], np.zeros(KEYS, bool))
+    found._batch = told = Told(state, [broken])
+    world.sounding[[20, 30]] = True
+    # In the lead-in, in which no key should be down.
+    start = found.start(0, world, [nothing, nothing])
+    outcome = found.best(start, np.zeros((1, 2, 5, 46)))
+    assert outcome.cost == pytest.approx(cost)
+    assert len(outcome.heard) == 2
+    # A key that sounds does not sound again before it has come back.
+    np.testing.assert_array_equal(told.sounding, [world.sounding])
