@@ -37,7 +37,7 @@ class NominalTrackingConfig:
     """Most that the integral adds to a joint's target [rad]."""
     most_slide: float = 0.02
     """Most that it adds to a slide's target [m]."""
-    filter: float = 0.5
+    filter: float = 1.5
     """Time constant of the filter of errors, by the standard deviation of a joint's noise
     [s/rad]: where measurements are exact, nothing is filtered."""
     settle: float = 0.5

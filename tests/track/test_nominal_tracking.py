@@ -1,0 +1,149 @@
+"""Feedback that keeps hands on a motion, and where keys are found to lie."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pianomime.errors import InputError
+from pianomime.track.calibration import hand_along, keys_aside
+from pianomime.track.nominal_tracking import (
+    NominalTrackingConfig,
+    NominalTrackingController,
+    Reference,
+)
+from pianomime.world import World
+from pianomime.world.hand import Hand
+from pianomime.world.layout import LAYOUT
+from pianomime.world.model import SIDES, Side
+from pianomime.world.parameters import SUBSTEPS
+from pianomime.world.perturbation import Perturbation, PerturbedWorld, Sensors
+from pianomime.world_names import PAPER
+
+FRAMES, CONTROLS = 24, 5
+
+
+@pytest.fixture(scope="module")
+def ctrl() -> np.ndarray:
+    """(T, 5, 46) controls that move hands smoothly over the keys, and press some."""
+    time = np.arange(FRAMES * CONTROLS)[:, None] / (20 * CONTROLS)
+    draw = np.random.default_rng(0)
+    size = np.full(LAYOUT.hand_actuators, 0.3)
+    size[LAYOUT.slide_actuators] = 0.02
+    phase = draw.uniform(0.5, 2.0, LAYOUT.ctrl_size)
+    moved: np.ndarray = np.tile(size, 2) * (1 - np.cos(2 * np.pi * phase * time))
+    return moved.reshape(FRAMES, CONTROLS, -1)
+
+
+@pytest.fixture(scope="module")
+def reference(ctrl: np.ndarray) -> Reference:
+    return Reference.of(ctrl)
+
+
+def path(
+    reference: Reference,
+    perturbation: Perturbation,
+    config: NominalTrackingConfig | None = None,
+    delay: int | None = None,
+    aside: float = 0.0,
+) -> np.ndarray:
+    """(N, 54) positions of the hands after each physics step."""
+    world = PerturbedWorld(perturbation, quiet=True)
+    late = perturbation.delay_steps if delay is None else delay
+    sensors = Sensors(perturbation)
+    controller = NominalTrackingController(reference, sensors, config, late, aside)
+    controller.settle(world)
+    went = []
+    for step in range(len(reference.ctrl)):
+        world.step(controller.control(step, world), parts=SUBSTEPS)
+        went.append(world.qpos_hands)
+    return np.array(went)
+
+
+def error(reference: Reference, went: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((went - reference.path[1:]) ** 2)))
+
+
+NONE = NominalTrackingConfig(proportional=0.0, integral=0.0)
+
+
+def test_a_reference_is_what_the_nominal_world_does(ctrl: np.ndarray, reference: Reference) -> None:
+    world = World(quiet=True)
+    for frame, row in enumerate(ctrl):
+        np.testing.assert_array_equal(reference.path[frame * SUBSTEPS], world.qpos_hands)
+        world.step(row)
+    np.testing.assert_array_equal(reference.path[-1], world.qpos_hands)
+    np.testing.assert_array_equal(reference.ctrl[3], ctrl[0, 1])
+
+
+def test_nothing_is_added_in_the_nominal_world(reference: Reference) -> None:
+    world = World(quiet=True)
+    controller = NominalTrackingController(reference, Sensors(Perturbation()))
+    for step, sent in enumerate(reference.ctrl):
+        given = controller.control(step, world)
+        np.testing.assert_array_equal(given, sent)
+        world.step(given, parts=SUBSTEPS)
+
+
+@pytest.mark.parametrize(
+    "perturbation",
+    [Perturbation(hand_mass=1.1), Perturbation(gain=0.9), Perturbation(gain=1.1)],
+)
+def test_feedback_keeps_hands_nearer_to_the_reference(
+    perturbation: Perturbation, reference: Reference
+) -> None:
+    replayed = error(reference, path(reference, perturbation, NONE))
+    tracked = error(reference, path(reference, perturbation))
+    assert tracked < 0.8 * replayed
+
+
+def test_a_known_delay_is_planned_for(reference: Reference) -> None:
+    late = Perturbation(delay=0.05)
+    known = error(reference, path(reference, late))
+    unknown = error(reference, path(reference, late, delay=0))
+    assert known < 0.2 * unknown
+
+
+def test_a_filter_keeps_noise_from_the_hands(reference: Reference) -> None:
+    noisy = Perturbation(joint_noise=0.03, slide_noise=0.003)
+    still, steps = World(quiet=True), range(-400, 0)
+
+    def jitter(config: NominalTrackingConfig) -> float:
+        controller = NominalTrackingController(reference, Sensors(noisy), config)
+        sent = [controller.control(step, still) for step in steps]
+        return float(np.std(sent[100:], axis=0).mean())
+
+    proportional = NominalTrackingConfig(integral=0.0)
+    assert jitter(proportional) < 0.4 * jitter(replace(proportional, filter=0.0))
+    np.testing.assert_array_equal(path(reference, noisy), path(reference, noisy))
+
+
+def test_hands_go_where_the_keys_lie(reference: Reference) -> None:
+    went = path(reference, Perturbation(keys_aside=0.005), aside=0.005)
+    for index, side in enumerate(SIDES):
+        joints = LAYOUT.among_hands(index)
+        shift = (went[-1] - reference.path[-1])[joints]
+        assert shift @ hand_along(Hand(side)) == pytest.approx(0.005, abs=0.001)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_hands_are_moved_along_the_keyboard(side: Side) -> None:
+    hand = Hand(side)
+    rest = np.zeros(LAYOUT.hand_joints)
+    before = hand.points(rest).copy()
+    moved = hand.points(rest + 0.01 * hand_along(hand)) - before
+    np.testing.assert_allclose(moved, np.tile([0.0, 0.01, 0.0], (len(moved), 1)), atol=1e-12)
+
+
+@pytest.mark.parametrize("aside", [-0.004, 0.0, 0.003])
+def test_where_keys_lie_is_found_by_touch(aside: float) -> None:
+    world = PerturbedWorld(Perturbation(keys_aside=aside), quiet=True)
+    assert keys_aside(world, PAPER) == pytest.approx(aside, abs=0.0006)
+
+
+@pytest.mark.parametrize("wrong", [{"proportional": -1.0}, {"most": 0.0}, {"filter": float("nan")}])
+def test_wrong_settings_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=next(iter(wrong))):
+        replace(NominalTrackingConfig(), **wrong)
