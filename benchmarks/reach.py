@@ -24,7 +24,14 @@ import common
 from pianomime.files import atomic
 from pianomime.plan import reach
 from pianomime.plan.fingertip_plan import FINGERS
-from pianomime.plan.joint_path import BLACK_REST, HOME, WHITE_REST, PathConfig, smooth_path
+from pianomime.plan.joint_path import (
+    BLACK_REST,
+    HOME,
+    WHITE_REST,
+    PathConfig,
+    PathProblem,
+    smooth_path,
+)
 from pianomime.world.hand import Hand
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 
@@ -59,7 +66,8 @@ def distances(low: int, high: int, low_black: bool, high_black: bool) -> tuple[f
             targets[:, 1 + finger, 1] = side * tried
             weights[:, 1 + finger] = 1 / 0.0005
         clearance = np.full((len(tried), FINGER_COUNT), np.nan)
-        path = smooth_path(hand, np.zeros(LAYOUT.hand_joints), targets, weights, clearance, config)
+        start = np.zeros(LAYOUT.hand_joints)
+        path = smooth_path(PathProblem(hand, start, targets, weights, clearance, config))
         points = np.array([hand.points(pose) for pose in path[1:]])
         error = np.linalg.norm((points - targets)[:, [1 + low, 1 + high]], axis=-1).max(axis=1)
         reached |= error <= _WITHIN

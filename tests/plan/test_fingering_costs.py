@@ -225,6 +225,22 @@ def test_stretch_is_the_fourth_power_and_strain_the_square_of_the_reach(side: in
     assert chord_cost(side, wide, FREE)[0] == np.inf
 
 
+def test_only_the_thumb_crosses_where_fingers_are_in_each_others_way() -> None:
+    """Laws: what is in reach without crossing costs the same; crossed fingers are out of reach."""
+    for side in (LEFT, RIGHT):
+        any_order, own_order = (pair_cost(side, 1.0, 4.0, crossing) for crossing in (True, False))
+        same = np.isfinite(own_order)
+        np.testing.assert_array_equal(own_order[same], any_order[same])
+        low, high = (51, 53) if side == RIGHT else (53, 51)
+        assert np.isfinite(own_order[MIDDLE, RING, low, high])
+        assert np.isfinite(any_order[MIDDLE, RING, high, low])
+        assert np.isinf(own_order[MIDDLE, RING, high, low])
+        assert np.isfinite(own_order[THUMB, RING, high, low])
+        semitones = own_order[MIDDLE, RING, np.arange(87), np.arange(1, 88)]
+        if side == RIGHT:
+            assert np.isfinite(semitones).all()
+
+
 def test_hands_do_not_come_close_where_it_costs() -> None:
     """Two keys side by side, in the middle: without the price each hand takes one."""
     score = score_of((49, 4, 9), (48, 9, 22))

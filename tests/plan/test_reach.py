@@ -7,7 +7,7 @@ import pytest
 
 from pianomime.keyboard import BLACK, KEYS
 from pianomime.plan import LEFT, RIGHT
-from pianomime.plan.joint_path import WHITE_REST, PathConfig, smooth_path
+from pianomime.plan.joint_path import WHITE_REST, PathConfig, PathProblem, smooth_path
 from pianomime.plan.reach import EASE, pair_limits, stretch
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
@@ -75,9 +75,8 @@ def test_inverse_kinematics_reach_the_limit_and_no_further(low: int, high: int) 
                 targets[0, 1 + high] = [other, distance / 2, WHITE_REST - 0.009]
                 weights[0, [1 + low, 1 + high]] = 1 / 0.0005
                 clear = np.full((1, 5), np.nan)
-                path = smooth_path(
-                    hand, np.zeros(LAYOUT.hand_joints), targets, weights, clear, config
-                )
+                start = np.zeros(LAYOUT.hand_joints)
+                path = smooth_path(PathProblem(hand, start, targets, weights, clear, config))
                 off = (hand.points(path[1]) - targets[0])[[1 + low, 1 + high]]
                 best = min(best, float(np.linalg.norm(off, axis=1).max()))
         return best

@@ -11,7 +11,7 @@ and short as long.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations, permutations
 from typing import NamedTuple
@@ -69,6 +69,8 @@ class FingeringConfig:
     """Speed of a finger between two keys, relative to its hand, that costs 1 [m/s]."""
     reuse: float = 4.0
     """Cost of a finger that changes keys within one frame; falls with the square of the frames."""
+    crossing: bool = True
+    """Whether fingers other than the thumb may cross, as where they pass through each other."""
     thumb_on_black: float = 0.2
     """Cost of the thumb on a black key."""
     weak_finger: float = 0.1
@@ -102,6 +104,11 @@ class FingeringConfig:
             late=4.0,
             travel_speed=0.35,
         )
+
+    @classmethod
+    def solid_notes(cls) -> FingeringConfig:
+        """Costs where notes count and neither hands nor fingers pass through each other."""
+        return replace(cls.notes(), crossing=False, crossed=3.0, apart=0.13)
 
 
 class Struck(NamedTuple):
@@ -176,7 +183,7 @@ def chord_cost(
     Returns:
         (O,) [key-frames]; infinite where the hand cannot reach all keys.
     """
-    pair = pair_cost(side, config.strain, config.stretch)
+    pair = pair_cost(side, config.strain, config.stretch, config.crossing)
     cost = np.zeros(len(strikes))
     for low, high in combinations(range(FINGER_COUNT), 2):
         cost += pair[low, high][strikes[:, low], strikes[:, high]]
@@ -184,15 +191,16 @@ def chord_cost(
 
 
 @cache
-def pair_cost(side: int, strain: float, limit: float) -> NDArray[np.float64]:
+def pair_cost(side: int, strain: float, limit: float, crossing: bool = True) -> NDArray[np.float64]:
     """(5, 5, 89, 89) Cost of two fingers on two keys [key-frames]; infinite out of reach.
 
     Args:
         side: `LEFT` or `RIGHT`.
         strain: factor of the square of the stretch.
         limit: factor of its fourth power.
+        crossing: whether fingers other than the thumb may cross.
     """
-    share = stretch(side)
+    share = stretch(side, crossing)
     within_reach = np.where(np.isinf(share), 0.0, share)
     cost = strain * within_reach**2 + limit * within_reach**4
     return np.where(np.isinf(share), np.inf, cost)
@@ -262,7 +270,7 @@ def _holding_cost(
     side: int, strikes: NDArray[np.int64], holds: NDArray[np.int64], config: FingeringConfig
 ) -> NDArray[np.float64]:
     """(B, O, 5) Cost [key-frames] of each finger holding its key (B, 5) while others strike."""
-    pair = pair_cost(side, config.strain, config.stretch)
+    pair = pair_cost(side, config.strain, config.stretch, config.crossing)
     cost = np.zeros((len(holds), len(strikes), FINGER_COUNT))
     for finger, other in permutations(range(FINGER_COUNT), 2):
         cost[..., finger] += pair[other, finger][strikes[:, other], holds[:, None, finger]]

@@ -91,7 +91,7 @@ class PathConfig:
     apart: float = 0.0
     """Distance that fingers, and hands, keep from each other [m]; 0 where they pass through each
     other, as in the paper's world."""
-    near: float = 0.001
+    near: float = 0.003
     """Shortfall of that distance [m]."""
 
     def __post_init__(self) -> None:

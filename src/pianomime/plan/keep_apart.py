@@ -67,9 +67,9 @@ def near(paths: list[NDArray[np.float64]], config: PathConfig, lasts: float = 1.
 
     Returns:
         (left, right) residuals: the shortfall of each distance by the shortfall at which its cost
-        is 1.
+        is 1; half of it for each hand where two hands meet.
     """
-    model, turns, moves = _wary_hands(config.apart)
+    model, turns, moved = _wary_hands(config.apart)
     data = mujoco.MjData(model)
     poses = np.empty((len(paths[0]), LAYOUT.hands_size))
     for index, path in enumerate(paths):
@@ -95,15 +95,17 @@ def near(paths: list[NDArray[np.float64]], config: PathConfig, lasts: float = 1.
     moment = np.cross(point, normal)
     gradient = np.einsum("cjk,ck->cj", rests[frame], normal)
     gradient += np.einsum("cjk,ck->cj", axes[frame] * turns[:, None], moment)
-    one, other = moves[model.geom_bodyid[geom]].swapaxes(0, 1)
+    one, other = moved[model.geom_bodyid[geom]].swapaxes(0, 1)
     gradient *= other.astype(float) - one
     scale = np.sqrt(lasts) / config.near
-    rows = []
-    for index in range(len(SIDES)):
-        mine = scale * gradient[:, LAYOUT.among_hands(index)]
-        some = mine.any(axis=1)
-        rows.append(Rows(frame[some], scale * (distance - config.apart)[some], mine[some]))
-    return rows
+    each = scale * np.stack([gradient[:, LAYOUT.among_hands(hand)] for hand in range(len(SIDES))])
+    moves = each.any(axis=2)
+    # Each hand gives way by half where both can.
+    residual = scale * (distance - config.apart) / np.maximum(moves.sum(axis=0), 1)
+    return [
+        Rows(frame[some], residual[some], mine[some])
+        for mine, some in zip(each, moves, strict=True)
+    ]
 
 
 @cache

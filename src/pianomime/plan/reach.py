@@ -22,6 +22,10 @@ _REACH: dict[str, Any] = json.loads(
     resources.files("pianomime.plan").joinpath("reach.json").read_text("utf-8")
 )
 
+_SIDE_BY_SIDE = 0.011
+"""[m] Least distance of two fingers that do not cross: a white and a black key side by side are no
+nearer."""
+
 EASE: NDArray[np.float64] = np.array(_REACH["ease"])
 """(5,) [m] Distance of each fingertip from the middle finger along the keyboard, in a relaxed right
 hand; that of a left hand has the opposite sign."""
@@ -51,11 +55,14 @@ def _limits() -> dict[tuple[int, int, bool, bool], tuple[float, float]]:
 
 
 @cache
-def stretch(side: int) -> NDArray[np.float64]:
+def stretch(side: int, crossing: bool = True) -> NDArray[np.float64]:
     """How far a hand is stretched, or its fingers are crossed, to hold two keys.
 
     Args:
         side: `LEFT` or `RIGHT`.
+        crossing: whether any two fingers may cross, as where they pass through each other; else
+            only the thumb crosses others, as in the models of human fingering (Parncutt et al.
+            1997).
 
     Returns:
         (5, 5, 89, 89) by finger, other finger, key and other key: 0 where the fingers lie as in
@@ -81,6 +88,8 @@ def stretch(side: int) -> NDArray[np.float64]:
                 (ease - distance) / (ease - least),
             )
             share[share > 1.0] = np.inf
+            if low and not crossing:
+                share[distance < _SIDE_BY_SIDE] = np.inf
             table[low, high, :KEYS, :KEYS] = share
             table[high, low, :KEYS, :KEYS] = share.T
     table.setflags(write=False)

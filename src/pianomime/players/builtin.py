@@ -44,6 +44,11 @@ ZERO_SHOT_20HZ = "zero-shot-20hz"
 with frames, and frames are what counts. Learners build on it."""
 
 
+_APART = 0.002
+"""[m] Distance that fingers and hands keep in plans for hands that do not pass through each other:
+contacts begin at 1 mm."""
+
+
 class DemonstrationNeededError(InputError):
     """The player plays demonstrations alone, and none was given."""
 
@@ -58,11 +63,24 @@ def _budget(effort: int, seed: int) -> PredictiveSamplingConfig:
     return replace(PredictiveSamplingConfig.of_effort(effort or 1), seed=seed)
 
 
+def _notes(world: str) -> tuple[ZeroShotConfig, KeystrokeConfig]:
+    """How to plan and strike notes in a world."""
+    planner, tracker = ZeroShotConfig(fingering=FingeringConfig.notes()), KeystrokeConfig()
+    if world == PAPER:
+        return planner, tracker
+    path = replace(planner.path, path=replace(planner.path.path, apart=_APART))
+    return (
+        replace(planner, fingering=FingeringConfig.solid_notes(), path=path),
+        replace(tracker, path=replace(tracker.path, apart=_APART)),
+    )
+
+
 def _zero_shot(effort: int, seed: int, world: str = PAPER, **settings: Any) -> Player:
+    planning, striking = _notes(world)
     planner, tracker, rehearsal, sampling = configure(
         settings,
-        planner=ZeroShotConfig(fingering=FingeringConfig.notes()),
-        tracker=KeystrokeConfig(),
+        planner=planning,
+        tracker=striking,
         rehearsal=RehearsalConfig(),
         sampling=replace(NoteSamplingConfig.of_effort(effort or 1), seed=seed),
     )
