@@ -44,9 +44,10 @@ def smooth_paths(
         (left, right) joint positions (T + 1, 27) [rad, m]; the first row is where the hand starts.
     """
     config = problems[0].config
+    begin: list[NDArray[np.float64] | None] = [None] * len(problems)
     paths = [
         problem.begin(guess)
-        for problem, guess in zip(problems, guesses or [None] * len(problems), strict=True)
+        for problem, guess in zip(problems, guesses if guesses else begin, strict=True)
     ]
     for _ in range(config.iterations):
         rows = near(paths, config, problems[0].lasts) if config.apart else [None] * len(paths)
@@ -74,24 +75,24 @@ def near(paths: list[NDArray[np.float64]], config: PathConfig, lasts: float = 1.
     poses = np.empty((len(paths[0]), LAYOUT.hands_size))
     for index, path in enumerate(paths):
         poses[:, LAYOUT.among_hands(index)] = path
-    # Along a normal n, a hinge moves a point p by n . (axis x (p - anchor)), which is
-    # axis . (p x n) + n . (anchor x axis), and a slide by n . axis.
-    axes, rests = np.empty((2, *poses.shape, 3))
+    axes, anchors = np.empty((2, *poses.shape, 3))
     places = []
-    for frame, pose in enumerate(poses):
+    for row, pose in enumerate(poses):
         data.qpos[:] = pose
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_collision(model, data)
-        axes[frame] = data.xaxis
-        rests[frame] = np.where(turns[:, None], np.cross(data.xanchor, data.xaxis), data.xaxis)
+        axes[row], anchors[row] = data.xaxis, data.xanchor
         if data.ncon:
             contact = data.contact
             columns = (contact.geom, contact.dist, contact.pos, contact.frame[:, :3])
-            places.append((np.full(data.ncon, frame), *(np.array(column) for column in columns)))
+            places.append((np.full(data.ncon, row), *(np.array(column) for column in columns)))
     if not places:
         return [Rows(*_NOWHERE)] * len(SIDES)
     frame, geom, distance, point, normal = map(np.concatenate, zip(*places, strict=True))
+    # Along a normal n, a hinge moves a point p by n . (axis x (p - anchor)), which is
+    # axis . (p x n) + n . (anchor x axis), and a slide by n . axis.
+    rests = np.where(turns[:, None], np.cross(anchors, axes), axes)
     moment = np.cross(point, normal)
     gradient = np.einsum("cjk,ck->cj", rests[frame], normal)
     gradient += np.einsum("cjk,ck->cj", axes[frame] * turns[:, None], moment)
