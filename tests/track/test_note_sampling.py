@@ -23,6 +23,7 @@ from pianomime.track import (
 )
 from pianomime.track.keystroke import KeystrokeController
 from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
+from pianomime.track.perturbed_copies import COPIES
 from pianomime.track.strokes import StrokeConfig
 from pianomime.track.variations import Variations
 from pianomime.world import World
@@ -70,13 +71,17 @@ def test_where_nothing_is_wrong_the_base_is_followed_bit_for_bit() -> None:
     assert controller.steps == len(plan)
 
 
-def test_same_plan_same_controls_also_the_second_time_and_others_with_another_seed() -> None:
-    plan, tracker = plan_of(leaps(5).clip(0, 1.3)), sampling(QUICK)
+@pytest.mark.parametrize("copies", [0, 1])
+def test_same_plan_same_controls_also_the_second_time_and_others_with_another_seed(
+    copies: int,
+) -> None:
+    config = replace(QUICK, copies=copies)
+    plan, tracker = plan_of(leaps(5).clip(0, 1.3)), sampling(config)
     first, again = (play(tracker.start(plan))[0] for _ in range(2))
     np.testing.assert_array_equal(first, again)
-    threads = NoteSamplingTracker(PLAIN, QUICK, threads=2)
+    threads = NoteSamplingTracker(PLAIN, config, threads=2)
     np.testing.assert_array_equal(play(threads.start(plan))[0], first)
-    assert not np.array_equal(play(sampling(replace(QUICK, seed=4)).start(plan))[0], first)
+    assert not np.array_equal(play(sampling(replace(config, seed=4)).start(plan))[0], first)
 
 
 def test_world_and_plan_are_left_as_they_were() -> None:
@@ -151,39 +156,56 @@ def follow(
     return np.array(ctrl).reshape(-1, 5, 46), heard
 
 
+def roll_out(
+    world: World, frames: range, ctrl: NDArray[np.float64], goal: NDArray[np.bool_]
+) -> tuple[list[Frame], float]:
+    """What is heard of controls (H, S, 46) in a world, and what keys on their way cost."""
+    heard, short = [], 0.0
+    for frame, target in zip(frames, ctrl, strict=True):
+        world.step(target)
+        heard.append(Frame(strikes_in(world.key_events, frame * FRAME_SECONDS), world.pressed))
+        short += 0.01 * np.abs(world.key_state - goal[frame]).sum()
+    return heard, short
+
+
 def slowly(plan: FingertipPlan, config: NoteSamplingConfig) -> tuple[NDArray[np.float64], int]:
     """The controls (T, S, 46) that are played, and how often any were varied."""
-    base, world, goal = PLAIN.start(plan), World(), plan.keys()
-    cost = NoteCost(base.strikes, goal, TOUCHES["goebl-bresin"], config.cost)
+    base, goal = PLAIN.start(plan), plan.keys()
+    worlds = [World(), *(World(each.model()) for each in COPIES[: config.copies])]
+    costs = [NoteCost(base.strikes, goal, TOUCHES["goebl-bresin"], config.cost) for _ in worlds]
     variations = Variations(plan, config)
     played: list[NDArray[np.float64]] = []
     varied = 0
     while len(played) < len(plan):
         first = len(played)
         frames = range(first, min(first + config.ahead, len(plan)))
-        best, heard = follow(base, world.copy(), frames)
-        value, wrong = cost.of(first, heard, min(config.commit + 2, len(frames)))
-        _, later = cost.of(first, heard, len(frames))
-        if later and (wrong or value >= config.trigger):
+        best, _ = follow(base, worlds[0].copy(), frames)
+        wrong = []
+        for world, cost in zip(worlds, costs, strict=True):
+            heard, _ = roll_out(world.copy(), frames, best, goal)
+            value, soon = cost.of(first, heard, min(config.commit + 2, len(frames)))
+            _, later = cost.of(first, heard, len(frames))
+            if later and (soon or value >= config.trigger):
+                wrong += later
+        if wrong:
             varied += 1
-            wrong = later
             probability = variations.probabilities(first, wrong)
             for _ in range(config.rounds):
                 drawn = variations.draw(len(frames), probability, 5).reshape(-1, *best.shape)
                 tries = [best, *(best + drawn[1:])]
-                costs = []
+                value_of = []
                 for each in tries:
-                    other, heard, short = world.copy(), [], 0.0
-                    for frame, ctrl in zip(frames, each, strict=True):
-                        other.step(ctrl)
-                        begin = frame * FRAME_SECONDS
-                        heard.append(Frame(strikes_in(other.key_events, begin), other.pressed))
-                        short += 0.01 * np.abs(other.key_state - goal[frame]).sum()
-                    costs.append(cost.of(first, heard, len(frames))[0] + short)
-                best = tries[int(np.argmin(costs))]
+                    values = []
+                    for world, cost in zip(worlds, costs, strict=True):
+                        heard, short = roll_out(world.copy(), frames, each, goal)
+                        values.append(cost.of(first, heard, len(frames))[0] + short)
+                    copies = sum(values[1:]) / len(values[1:]) if config.copies else 0.0
+                    value_of.append(values[0] + copies)
+                best = tries[int(np.argmin(value_of))]
         for frame, ctrl in zip(frames[: config.commit], best, strict=False):
-            world.step(ctrl)
-            cost.heard(strikes_in(world.key_events, frame * FRAME_SECONDS))
+            for world, cost in zip(worlds, costs, strict=True):
+                world.step(ctrl)
+                cost.heard(strikes_in(world.key_events, frame * FRAME_SECONDS))
             played.append(ctrl)
     return np.array(played), varied
 
@@ -193,8 +215,9 @@ def slowly(plan: FingertipPlan, config: NoteSamplingConfig) -> tuple[NDArray[np.
     [
         replace(QUICK, cost=NoteCostConfig(notice=0.02)),
         replace(QUICK, rounds=1, commit=1, ahead=5, trigger=0.05, cost=NoteCostConfig(notice=0.1)),
+        replace(QUICK, copies=2, variations=3, cost=NoteCostConfig(notice=0.02)),
     ],
-    ids=["a little wrong", "costs a little"],
+    ids=["a little wrong", "costs a little", "perturbed copies"],
 )
 def test_it_is_what_is_written_down_slowly(config: NoteSamplingConfig) -> None:
     plan = plan_of(leaps(5).clip(0, 1.0))
@@ -210,6 +233,13 @@ def test_budgets_are_one_or_more(name: str) -> None:
     assert getattr(NoteSamplingConfig(**{name: 1}), name) == 1
     with pytest.raises(InputError, match=f"{name} must be 1 or more"):
         NoteSamplingConfig(**{name: 0})
+
+
+@pytest.mark.parametrize("copies", [-1, len(COPIES) + 1, 0.5])
+def test_there_are_so_many_copies_and_no_more(copies: float) -> None:
+    assert NoteSamplingConfig(copies=len(COPIES)).copies == len(COPIES)
+    with pytest.raises(InputError, match="copies must be"):
+        NoteSamplingConfig(copies=copies)  # type: ignore[arg-type]
 
 
 def test_a_plan_without_strikes_is_refused_in_one_line() -> None:

@@ -3,6 +3,7 @@
 The cost of a roll-out only grows. As soon as it exceeds that of the best known, the roll-out ends,
 which changes nothing but the time it takes. Where one hand alone is varied, and the other is far
 from it, only that hand is simulated, and the keys of the other do what they are known to do.
+Controls may be rolled out in perturbed copies of the world, too; what has lost in it is not.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,7 @@ from pianomime.world import World, WorldBatch
 from pianomime.world.hand import hand_points
 from pianomime.world.one_hand import one_hand_model, state_of_one_hand
 from pianomime.world.parameters import key_centres
+from pianomime.world.perturbation import Perturbation
 
 _SHORT = 0.01
 """Cost of a key's way to where it should be: keys that are nearly right are better."""
@@ -73,18 +76,28 @@ class Rollouts:
         most: number of controls that are rolled out side by side.
         threads: how many step at the same time; 0 for one on each core.
         world: name of the world.
+        perturbation: how it differs; not at all if None.
     """
 
     def __init__(
-        self, cost: NoteCost, goal: NDArray[np.bool_], most: int, threads: int, world: str
+        self,
+        cost: NoteCost,
+        goal: NDArray[np.bool_],
+        most: int,
+        threads: int,
+        world: str,
+        perturbation: Perturbation | None = None,
     ) -> None:
         self._cost, self._goal, self._world = cost, goal, world
         self.steps = self.alone = 0
-        self._batch = WorldBatch(most, threads, quiet=True, model=world)
+
+        def batch(model: str | mujoco.MjModel) -> WorldBatch:
+            given = model if perturbation is None else perturbation.model(model)
+            return WorldBatch(most, threads, quiet=True, model=given)
+
+        self._batch = batch(world)
         # Made when first needed: many pieces never need them.
-        self._of_hand = cache(
-            lambda hand: WorldBatch(most, threads, quiet=True, model=one_hand_model(hand, world))
-        )
+        self._of_hand = cache(lambda hand: batch(one_hand_model(hand, world)))
 
     def start(self, first: int, world: World, known: Sequence[Frame]) -> Start:
         """Both hands, as they are in a world.
@@ -109,7 +122,11 @@ class Rollouts:
         return start._replace(batch=self._of_hand(hand), state=state, mine=keys, alone=True)
 
     def best(
-        self, start: Start, tries: NDArray[np.float64], known: Outcome | None = None
+        self,
+        start: Start,
+        tries: NDArray[np.float64],
+        known: Outcome | None = None,
+        copies: Sequence[tuple[Rollouts, Start]] = (),
     ) -> Outcome:
         """The outcome that costs least; of several, the first, and `known` before all.
 
@@ -117,9 +134,33 @@ class Rollouts:
             start: whence.
             tries: (B, H, S, 46) controls.
             known: the best known from there.
+            copies: roll-outs in perturbed copies of the world, each with whence there; the mean of
+                what controls cost in them is added.
         """
-        first, batch, bound = start.first, start.batch, known.cost if known else math.inf
-        left = np.arange(len(tries))
+        bound = known.cost if known else math.inf
+        found = self._outcomes(start, tries, np.full(len(tries), bound))
+        for rollouts, there in copies:
+            # What is left of the bound, as a cost in this copy.
+            rest = np.full(len(tries), -math.inf)
+            for index, one in found.items():
+                rest[index] = (bound - one.cost) * len(copies)
+            there_too = rollouts._outcomes(there, tries, rest)
+            found = {
+                index: found[index]._replace(cost=found[index].cost + one.cost / len(copies))
+                for index, one in there_too.items()
+            }
+        outcomes = found.values()
+        return min([known, *outcomes] if known else outcomes, key=lambda each: each.cost)
+
+    def _outcomes(
+        self, start: Start, tries: NDArray[np.float64], bounds: NDArray[np.float64]
+    ) -> dict[int, Outcome]:
+        """Outcomes, by index, of controls that cost no more than their bounds (B,).
+
+        Those whose bound is negative are not rolled out.
+        """
+        first, batch = start.first, start.batch
+        left = np.flatnonzero(bounds >= -_ROUNDING)
         batch.set_state(start.state, left)
         batch.sounding[left] = start.sounding
         tallies = [self._cost.tally(first) for _ in tries]
@@ -138,13 +179,15 @@ class Rollouts:
                 tallies[index].add(frame)
             sure = np.array([tallies[index].least for index in left])
             sure += short[left] + _BROKEN * batch.blow_ups[left]
-            left = left[sure <= bound + _ROUNDING]
+            left = left[sure <= bounds[left] + _ROUNDING]
         costs = {
             index: short[index] + tallies[index].total() + _BROKEN * batch.blow_ups[index]
             for index in left.tolist()
         }
-        found = [Outcome(tries[index], float(cost), played[index]) for index, cost in costs.items()]
-        return min([known, *found] if known else found, key=lambda each: each.cost)
+        return {
+            index: Outcome(tries[index], float(cost), played[index])
+            for index, cost in costs.items()
+        }
 
     def _frames(self, start: Start, step: int, left: NDArray[np.int64]) -> list[Frame]:
         """What is heard in a frame of each of some worlds."""

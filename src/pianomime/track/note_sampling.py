@@ -5,10 +5,14 @@ world, and where something goes wrong, variations of its controls are rolled out
 counts is what an ear minds (`note_cost`): a strike that nobody wanted costs more than a missed
 inner note, and strikes have their times and touch. What was looked ahead is kept while nothing is
 wrong.
+
+With perturbed copies of the world, the same is done in each of them, where the controls that are
+played are replayed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -20,6 +24,7 @@ from pianomime.plan import FingertipPlan
 from pianomime.track.keystroke import KeystrokeController
 from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
 from pianomime.track.note_rollouts import Rollouts, Start, keys_of
+from pianomime.track.perturbed_copies import COPIES, PerturbedCopy
 from pianomime.track.rehearsal import KeystrokeStarter
 from pianomime.track.variations import VariationConfig, Variations
 from pianomime.validation import within
@@ -49,6 +54,9 @@ class NoteSamplingConfig(VariationConfig):
     apart: float = 0.04
     """Distance between the fingers of both hands along the keyboard from which on a hand that alone
     is varied is simulated alone [m]."""
+    copies: int = 0
+    """Perturbed copies of the world, up to 3, in which controls have to go well, too, when they are
+    replayed there. Each costs about as much again."""
     cost: NoteCostConfig = field(default_factory=NoteCostConfig)
     """What an ear minds."""
 
@@ -56,6 +64,7 @@ class NoteSamplingConfig(VariationConfig):
         super().__post_init__()
         for name in ("rounds", "commit", "ahead"):
             within(name, getattr(self, name), 1)
+        within("copies", self.copies, 0, len(COPIES))
 
     @classmethod
     def of_effort(cls, effort: int) -> NoteSamplingConfig:
@@ -111,6 +120,8 @@ class NoteSamplingController:
 
     Attributes:
         plan: what is followed.
+        copies: of the world, perturbed. They have followed what is to be played as far as it was
+            chosen.
 
     Args:
         base: the controller to improve.
@@ -128,9 +139,21 @@ class NoteSamplingController:
         goal = base.plan.keys()
         stroke = base.config.stroke
         wanted = replace(base.strikes, velocity=stroke.velocities(base.strikes))
-        self._cost = NoteCost(wanted, goal, TOUCHES[stroke.touch], config.cost)
+        touch = TOUCHES[stroke.touch]
+        self._cost = NoteCost(wanted, goal, touch, config.cost)
         self._variations = Variations(base.plan, config)
         self._rollouts = Rollouts(self._cost, goal, config.variations, threads, base.world)
+        self.copies = [
+            PerturbedCopy(
+                each,
+                base.world,
+                NoteCost(wanted, goal, touch, config.cost),
+                goal,
+                config.variations,
+                threads,
+            )
+            for each in COPIES[: config.copies]
+        ]
         self._chosen: list[NDArray[np.float64]] = []
         self._known: list[_Step] = []
         self._ahead: World | None = None
@@ -143,12 +166,12 @@ class NoteSamplingController:
     @property
     def steps(self) -> int:
         """Number of frames that were simulated to look ahead so far."""
-        return self._followed + self._rollouts.steps
+        return self._followed + self._rollouts.steps + sum(copy.steps for copy in self.copies)
 
     @property
     def steps_alone(self) -> int:
         """Of these, the number in which one hand alone was simulated."""
-        return self._rollouts.alone
+        return self._rollouts.alone + sum(copy.rollouts.alone for copy in self.copies)
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) the control found.
@@ -167,38 +190,64 @@ class NoteSamplingController:
 
     def _choose(self, first: int, world: World) -> list[NDArray[np.float64]]:
         """The controls (S, 46) of each of the next frames to be played."""
-        config = self.config
-        frames = min(config.ahead, len(self.plan) - first)
-        commit = min(config.commit, frames)
+        frames = min(self.config.ahead, len(self.plan) - first)
+        commit = min(self.config.commit, frames)
         known = self._look_ahead(first, frames, world)
-        heard = [step.frame for step in known]
-        cost, soon = self._cost.of(first, heard, min(commit + 2, frames))
-        _, wrong = self._cost.of(first, heard, frames)
-        # Where many keys are a little wrong, but nothing else, there is no finger to blame.
-        if not wrong or (not soon and cost < config.trigger):
+        ctrl = np.array([step.ctrl for step in known])
+        starts = [self._rollouts.start(first, world, [step.frame for step in known])]
+        starts += [copy.start(first, ctrl) for copy in self.copies]
+        costs = [self._cost, *(copy.cost for copy in self.copies)]
+        wrong = [
+            each
+            for cost, start in zip(costs, starts, strict=True)
+            for each in self._wrong(cost, first, start.known)
+        ]
+        if wrong:
+            self._ahead = None
+            ctrl = self._vary(known, starts, self._variations.probabilities(first, wrong))
+        else:
             self._known = known[commit:]
-            return [step.ctrl for step in known[:commit]]
-        self._ahead = None
-        probability = self._variations.probabilities(first, wrong)
-        start = self._start(first, world, known, probability)
-        best = self._rollouts.best(start, np.array([[step.ctrl for step in known]]))
-        for _ in range(config.rounds):
-            drawn = self._variations.draw(frames, probability, self.controls_per_frame)
+        chosen = list(ctrl[:commit])
+        for copy in self.copies:
+            copy.follow(first, chosen)
+        return chosen
+
+    def _wrong(self, cost: NoteCost, first: int, heard: Sequence[Frame]) -> list[tuple[int, int]]:
+        """What goes wrong in a world, as of `NoteCost.of`; nothing where it is not to be varied."""
+        config, frames = self.config, len(heard)
+        value, soon = cost.of(first, heard, min(config.commit + 2, frames))
+        _, wrong = cost.of(first, heard, frames)
+        # Where many keys are a little wrong, but nothing else, there is no finger to blame.
+        return wrong if soon or value >= config.trigger else []
+
+    def _vary(
+        self, known: list[_Step], starts: list[Start], probability: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(H, S, 46) The best variation of controls that were looked ahead.
+
+        Args:
+            known: what was looked ahead.
+            starts: whence they are rolled out in the world and in its copies, with both hands.
+            probability: (46,) that each actuator is varied.
+        """
+        rollouts = [self._rollouts, *(copy.rollouts for copy in self.copies)]
+        varied = [hand for hand, range_ in enumerate(LAYOUT.actuators) if probability[range_].any()]
+        if len(varied) == 1:
+            hands = np.array([step.hands for step in known])
+            keys = keys_of(varied[0], hands, self.config.apart)
+            if keys is not None:
+                starts = [
+                    each.start_alone(start, varied[0], keys)
+                    for each, start in zip(rollouts, starts, strict=True)
+                ]
+        start, copies = starts[0], list(zip(rollouts, starts, strict=True))[1:]
+        best = self._rollouts.best(start, np.array([[step.ctrl for step in known]]), copies=copies)
+        for _ in range(self.config.rounds):
+            drawn = self._variations.draw(len(known), probability, self.controls_per_frame)
             # The first is the best so far.
             tries = best.ctrl + drawn[1:].reshape(-1, *best.ctrl.shape)
-            best = self._rollouts.best(start, tries, best)
-        return list(best.ctrl[:commit])
-
-    def _start(
-        self, first: int, world: World, known: list[_Step], probability: NDArray[np.float64]
-    ) -> Start:
-        """Whence variations are rolled out: with both hands, or with the one that is varied."""
-        start = self._rollouts.start(first, world, [step.frame for step in known])
-        varied = [hand for hand, range_ in enumerate(LAYOUT.actuators) if probability[range_].any()]
-        if len(varied) != 1:
-            return start
-        keys = keys_of(varied[0], np.array([step.hands for step in known]), self.config.apart)
-        return start if keys is None else self._rollouts.start_alone(start, varied[0], keys)
+            best = self._rollouts.best(start, tries, best, copies)
+        return best.ctrl
 
     def _look_ahead(self, first: int, frames: int, world: World) -> list[_Step]:
         """What the base controller does in the next frames."""
