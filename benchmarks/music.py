@@ -43,6 +43,7 @@ from pianomime.plan import FingertipPlan, Planner
 from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.players import PlannedPlayer
 from pianomime.shown import markdown_cell
+from pianomime.world_names import PAPER, WORLDS
 
 SECONDS = 30.0
 LEAD_IN = 0.5
@@ -144,18 +145,20 @@ class Playing:
         effort: how hard it tries, 0 to 3.
         lead_in: silence before the first note [s].
         settings: of the player.
+        world: name of the world.
     """
 
     player: str
     effort: int
     lead_in: float = LEAD_IN
     settings: dict[str, Any] = field(default_factory=dict)
+    world: str = PAPER
 
     @property
     def name(self) -> str:
         """For headings."""
         lead_in = f"lead-in {self.lead_in:g} s" if self.lead_in else "no lead-in"
-        return f"{self.player}, effort {self.effort}, {lead_in}"
+        return f"{self.player}, effort {self.effort}, {lead_in}, world {self.world}"
 
     def rows(
         self, songs: Sequence[Path], seconds: float, jobs: int, out: Path | None
@@ -168,6 +171,7 @@ class Playing:
             settings=self.settings,
             seconds=seconds,
             lead_in=self.lead_in,
+            world=self.world,
             jobs=jobs,
             out=out,
             progress=_tell,
@@ -449,7 +453,7 @@ def play_ablations(jobs: int, out: Path, most: int | None) -> Row:
     for ablation in ABLATIONS:
         playing = ablation.playing()
         try:
-            load_player(playing.player, playing.effort, **playing.settings)
+            load_player(playing.player, playing.effort, world=playing.world, **playing.settings)
         except InputError as error:
             raise SystemExit(f"without {ablation.part}: {error}") from None
     songs = development_songs()[:most]
@@ -504,6 +508,13 @@ def options() -> argparse.ArgumentParser:
         help="silence before the first note; each player plays with each (%(default)s)",
     )
     made.add_argument(
+        "--worlds",
+        nargs="+",
+        choices=WORLDS,
+        default=[PAPER],
+        help="where; each player plays in each (%(default)s)",
+    )
+    made.add_argument(
         "--sets", nargs="+", choices=[*SETS, TOUCH], default=DEFAULT_SETS, help="what is played"
     )
     made.add_argument(
@@ -534,7 +545,10 @@ def main() -> None:
     facts = machine()
     show_machine(facts)
     playings = [
-        replace(playing, lead_in=lead_in) for playing in asked.players for lead_in in asked.lead_in
+        replace(playing, lead_in=lead_in, world=world)
+        for playing in asked.players
+        for lead_in in asked.lead_in
+        for world in asked.worlds
     ]
     if asked.rtf:
         name, results = "rtf", play_alone(playings)

@@ -22,7 +22,7 @@ looked at when they end, and nobody hears so little."""
 _LINGER = 0.008
 """[s] From the end of the last frame that needs a key until it is let go: frames are looked at when
 they end."""
-_REPEAT = 0.09
+_REPEAT = 0.07
 """[s] A key that sounds again is let go at least so long before: it must come back half of its way,
 and the finger must be on it again."""
 _SHORTEST = 0.03

@@ -43,7 +43,7 @@ class NoteSamplingConfig(VariationConfig):
     """Standard deviation of variations of the wrists' actuators [rad]."""
     slide: float = 0.005
     """Standard deviation of variations of the forearms' slides [m]."""
-    rounds: int = 2
+    rounds: int = 3
     """Rounds of variations, each around the best so far."""
     commit: int = 3
     """Frames that are played before looking ahead again."""

@@ -52,7 +52,7 @@ class StrokeConfig:
     """Force that holds a key at its stop [N]."""
     ramp: float = 0.01
     """Time in which that force builds up after the onset [s]."""
-    rise: float = 0.01
+    rise: float = 0.02
     """Time in which the finger leaves the key [s]."""
     lift: float = 0.009
     """Height over the key to which it then rises [m]."""
