@@ -37,6 +37,7 @@ ALLOWED = {
     ("learn/envs/reward.py", "TIP_BOUND, TIP_MARGIN = 0.01, 0.05"),
     ("plan/hand_path.py", "alike_wrist: float = 0.05"),
     ("policies/finger_residual.py", "_DEPTH = 0.05"),
+    ("world/perturbation.py", "_FAR_ASIDE = 0.05"),
     ("track/dynamic.py", "_WRIST_TOLERANCE = 0.05"),
     ("track/keystroke.py", "_WRIST_TOLERANCE = 0.05"),
     ("video/hands/repair.py", "[0.01, -0.05]"),
@@ -56,6 +57,7 @@ ALLOWED = {
     ("songs/notation.py", "RELEASE = 0.05"),
     ("track/note_cost.py", "_OPEN = 0.05"),
     ("commands/progress.py", "_LINE_SECONDS = 30.0"),
+    ("evaluation/robust_grid.py", "Perturbation(delay=0.05)"),
     # Shares, probabilities and costs.
     ("evaluation/diagnose.py", "_TOUCHED = 0.05"),
     ("learn/envs/reward.py", "KEY_BOUND, KEY_MARGIN = 0.05"),

@@ -14,7 +14,7 @@ from pianomime.world import World
 from pianomime.world.layout import LAYOUT
 from pianomime.world.model import world_model
 from pianomime.world.parameters import PHYSICS_DT, SUBSTEPS, key_centres
-from pianomime.world.perturbation import PerturbedWorld, Perturbation, Sensors
+from pianomime.world.perturbation import Perturbation, PerturbedWorld, Sensors
 
 ALL = Perturbation(friction=0.7, hand_mass=1.1, gain=0.9, key_stiffness=1.2, keys_aside=0.002)
 

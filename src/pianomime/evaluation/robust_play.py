@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,12 +91,12 @@ def _heard(
             notes.add(world.key_events, step * FRAME_SECONDS / parts)
         qpos[frame], key_state[frame], pressed[frame] = world.qpos, world.key_state, world.pressed
         broke[frame] = world.blow_ups
-    return replace(
-        performance,
-        ctrl=np.concatenate(ctrl).reshape(frames, -1, LAYOUT.ctrl_size),
-        qpos=qpos,
-        key_state=key_state,
-        pressed=pressed,
+    happened: dict[str, Any] = {
+        "ctrl": np.concatenate(ctrl).reshape(frames, -1, LAYOUT.ctrl_size),
+        "qpos": qpos,
+        "key_state": key_state,
+        "pressed": pressed,
+        "blow_ups": np.flatnonzero(np.diff(broke, prepend=0)),
         **notes.arrays(frames * FRAME_SECONDS),
-        blow_ups=np.flatnonzero(np.diff(broke, prepend=0)),
-    )
+    }
+    return replace(performance, **happened)

@@ -109,9 +109,10 @@ def summarize(performance: Performance) -> Row:
         `pianomime.music.MusicMetrics`, and `protocol`, the digest of their protocol; `touch`, the
         map that velocities were read with; `world`, the name of that in which it was played;
         `body`, an object with `pianomime.players.body.BodyMetrics`; of the paper's protocol
-        `precision`, `recall` and `f1`, and `onset_f1` at its 20 Hz, 0..1, and `pedal_f1` where the player works the pedal;
-        `plan_seconds`, `simulate_seconds` and `realtime_factor`, which is `song_seconds` divided by
-        their sum; `notes` of the score and `dropped_notes`, those that the planner did not plan;
+        `precision`, `recall` and `f1`, and `onset_f1` at its 20 Hz, 0..1, and `pedal_f1` where the
+        player works the pedal; `plan_seconds`, `simulate_seconds` and `realtime_factor`, which is
+        `song_seconds` divided by their sum; `notes` of the score and `dropped_notes`, those that
+        the planner did not plan;
         `blow_ups`, the number of frames in which the physics became unstable; `remarks`, what was
         mended or left out when the score was read.
     """

@@ -71,7 +71,7 @@ def _nominal_neighbours(nominal: str) -> tuple[int, int]:
 def _strikes(nominal: str) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Controls (T, S, 46) of strikes without offset; what moves the hands by 1 m (46,); offsets."""
     offsets = np.arange(-_REACH, _REACH + _STEP / 2, _STEP)
-    onset = _EVERY * (np.arange(len(offsets)) + 0.5)
+    onset = np.asarray(_EVERY * (np.arange(len(offsets)) + 0.5), np.float64)
     score = Score(
         key=np.full(len(offsets), _KEY),
         onset=onset,
