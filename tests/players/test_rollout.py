@@ -55,7 +55,7 @@ def test_a_controller_that_works_the_pedal_does() -> None:
 
 
 def test_it_is_the_only_such_loop() -> None:
-    """Nobody else asks for controls and steps a World by them, but to look ahead, rehearse or calibrate."""
+    """Nobody else asks for controls and steps a World by them, but to look ahead or prepare."""
     both = []
     for file in sorted(ROOM.rglob("*.py")):
         for function in ast.walk(ast.parse(file.read_text("utf-8"))):
@@ -71,6 +71,7 @@ def test_it_is_the_only_such_loop() -> None:
     assert both == [
         ("players/rollout.py", "rollout"),
         ("track/calibration.py", "_strikes"),
+        ("track/nominal_tracking.py", "settle"),
         ("track/note_sampling.py", "_look_ahead"),
         ("track/predictive_sampling.py", "_search"),
         ("track/rehearsal.py", "_listen"),
