@@ -44,7 +44,7 @@ def test_songs_are_scored_and_one_that_fails_is_a_row(folder: Path, tmp_path: Pa
     )
 
     assert results == json.loads((out / "results.json").read_text(encoding="utf-8"))
-    asked = {"player", "effort", "seed", "settings", "seconds", "lead_in"}
+    asked = {"player", "effort", "seed", "world", "settings", "seconds", "lead_in"}
     assert set(results) == asked | {"songs", "mean", "measured", "causes"}
     assert (results["seconds"], results["lead_in"]) == (1.0, 0.0)
     rows = {row["song"]: row for row in results["songs"]}
@@ -191,7 +191,7 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
 def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
     setup = {"player": "zero-shot", "effort": 0, "seed": 0, "settings": {}}
-    setup |= {"seconds": 1.0, "lead_in": 0.0}
+    setup |= {"world": None, "seconds": 1.0, "lead_in": 0.0}
     with Worker(SONG_WORKER, setup) as worker:
         assert "f1" in worker.ask(song_request(song, None))
         os.kill(worker.pid, signal.SIGKILL)

@@ -14,7 +14,7 @@ from pianomime import Score, excerpt, songs
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.plan.fingering import find_fingering
 from pianomime.plan.hand_path import make_feasible
-from pianomime.plan.joint_path import smooth_path
+from pianomime.plan.joint_path import PathProblem, smooth_path
 from pianomime.world.hand import Hand
 
 STORED = Path(__file__).with_name("fingerings.npz")
@@ -64,7 +64,7 @@ def test_the_joint_path_is_the_stored_one() -> None:
     points = stored["fingertips"][:, 1] + [0.0, 0.0, 0.03]
     clearance = np.full((len(points), 5), 0.01)
     weights = np.full(points.shape, 250.0)
-    path = smooth_path(Hand("rh"), np.zeros(27), points, weights, clearance)
+    path = smooth_path(PathProblem(Hand("rh"), np.zeros(27), points, weights, clearance))
     np.testing.assert_allclose(path, stored["path"], atol=1e-6)
 
 

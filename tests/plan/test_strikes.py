@@ -81,7 +81,7 @@ def test_a_key_is_let_go_before_it_is_struck_again(score: Score) -> None:
         possible = apart > KEY_IS_UP
         assert (release[:-1][possible] <= onset[1:][possible]).all()
         far = apart > 0.15
-        assert (release[:-1][far] <= onset[1:][far] - 0.08).all()
+        assert (release[:-1][far] <= onset[1:][far] - 0.06).all()
 
 
 def test_a_note_is_struck_at_its_own_time_and_let_go_after_its_last_frame() -> None:
@@ -125,7 +125,7 @@ def test_a_repeated_note_is_let_go_in_time() -> None:
     score = notes([39, 39, 41], [0.12, 0.42, 0.42], lasts=0.3)
     strikes = strikes_of(score, by_hand(score))
     np.testing.assert_allclose(strikes.onset, [0.12, 0.42, 0.42])
-    assert strikes.release[of_note(strikes)[0]] < 0.42 - 0.08
+    assert strikes.release[of_note(strikes)[0]] < 0.42 - 0.06
     # So quick that there is no time for both: it must still be struck.
     score = notes([39, 39], [0.12, 0.22], lasts=0.1)
     strikes = strikes_of(score, by_hand(score))

@@ -17,7 +17,8 @@ from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
-from pianomime.plan.joint_path import resting_height, smooth_path
+from pianomime.plan.joint_path import PathProblem, resting_height
+from pianomime.plan.keep_apart import smooth_paths
 from pianomime.track import (
     KeystrokeConfig,
     KeystrokeTracker,
@@ -238,11 +239,11 @@ def test_strokes_count_for_each_of_their_points_and_all_else_for_its_time(
     plan = plan_of(notes([44], [0.1], 0.3))
     weights: list[NDArray[np.float64]] = []
 
-    def watched(*given: Any) -> NDArray[np.float64]:
-        weights.append(given[3])
-        return smooth_path(*given)
+    def watched(problems: list[PathProblem], *given: Any) -> list[NDArray[np.float64]]:
+        weights.extend(problem.weights for problem in problems)
+        return smooth_paths(problems, *given)
 
-    monkeypatch.setattr(keystroke, "smooth_path", watched)
+    monkeypatch.setattr(keystroke, "smooth_paths", watched)
     found = {}
     for controls in (1, 5):
         KeystrokeTracker(KeystrokeConfig(controls=controls)).start(plan)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import KEYS
+from pianomime.short_repr import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,8 @@ class Joints:
     actuator_units: tuple[str, ...]
     mover: NDArray[np.int64]
     coupled: dict[int, tuple[int, ...]]
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> Joints:

@@ -13,6 +13,7 @@ from pianomime.export.joints import Joints, effort_unit
 from pianomime.export.samples import PHYSICS_RATE
 from pianomime.keyboard import KEYS
 from pianomime.players.motion import FrameMotion
+from pianomime.short_repr import short_repr
 from pianomime.world.parameters import SUBSTEPS
 
 HAND_SPEED = 2.0
@@ -68,6 +69,8 @@ class Limits:
     effort: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> Limits:

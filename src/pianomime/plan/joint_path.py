@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pianomime.keyboard import BLACK, FRAME_SECONDS
 from pianomime.plan.band_solve import solve_in_windows
 from pianomime.progress import ignore
+from pianomime.short_repr import short_repr
 from pianomime.validation import above_zero, whole_numbers, within
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
@@ -141,6 +142,8 @@ class PathProblem:
     clearance: NDArray[np.float64]
     config: PathConfig = field(default_factory=PathConfig)
     dt: float = FRAME_SECONDS
+
+    __repr__ = short_repr
 
     @property
     def lasts(self) -> float:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.short_repr import short_repr
 from pianomime.track.calibration import hand_along
 from pianomime.validation import above_zero, finite
 from pianomime.world import World
@@ -60,6 +61,8 @@ class Reference:
 
     ctrl: NDArray[np.float64]
     path: NDArray[np.float64]
+
+    __repr__ = short_repr
 
     @classmethod
     def of(cls, ctrl: NDArray[np.float64], world: str = PAPER) -> Reference:

@@ -71,8 +71,8 @@ class NoteSamplingConfig(VariationConfig):
         """The budgets of efforts 1 to 3: each is several times the one before."""
         return {
             1: cls(),
-            2: cls(rounds=6),
-            3: cls(variations=32, rounds=12),
+            2: cls(rounds=9),
+            3: cls(variations=32, rounds=18),
         }[effort]
 
 
