@@ -168,6 +168,14 @@ def roll_out(
     return heard, short
 
 
+def restored(world: World) -> World:
+    """A world in the same state, whose keys are all awake, as those of roll-outs are."""
+    other = World(world.model, quiet=True)
+    other.set_state(world.state())
+    other.sounding = world.sounding.copy()
+    return other
+
+
 def slowly(plan: FingertipPlan, config: NoteSamplingConfig) -> tuple[NDArray[np.float64], int]:
     """The controls (T, S, 46) that are played, and how often any were varied."""
     base, goal = PLAIN.start(plan), plan.keys()
@@ -182,7 +190,8 @@ def slowly(plan: FingertipPlan, config: NoteSamplingConfig) -> tuple[NDArray[np.
         best, _ = follow(base, worlds[0].copy(), frames)
         wrong = []
         for world, cost in zip(worlds, costs, strict=True):
-            heard, _ = roll_out(world.copy(), frames, best, goal)
+            start = world.copy() if world is worlds[0] else restored(world)
+            heard, _ = roll_out(start, frames, best, goal)
             value, soon = cost.of(first, heard, min(config.commit + 2, len(frames)))
             _, later = cost.of(first, heard, len(frames))
             if later and (soon or value >= config.trigger):
@@ -197,7 +206,7 @@ def slowly(plan: FingertipPlan, config: NoteSamplingConfig) -> tuple[NDArray[np.
                 for each in tries:
                     values = []
                     for world, cost in zip(worlds, costs, strict=True):
-                        heard, short = roll_out(world.copy(), frames, each, goal)
+                        heard, short = roll_out(restored(world), frames, each, goal)
                         values.append(cost.of(first, heard, len(frames))[0] + short)
                     copies = sum(values[1:]) / len(values[1:]) if config.copies else 0.0
                     value_of.append(values[0] + copies)
