@@ -30,6 +30,7 @@ ROOMS = (
     ("video",),
     ("learn",),
     ("evaluation",),
+    ("replay",),
     ("report",),
     ("commands",),
     ("cli",),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
 from pianomime.music import protocol_digest
 from pianomime.players.body import body_metrics
+from pianomime.players.motion import FrameMotion
 from pianomime.players.performance import Performance
 from pianomime.schema import Field, Schema
 from pianomime.shown import shown
@@ -98,11 +100,12 @@ ROW_SCHEMA: dict[str, Schema] = {
 """Schema of a summary."""
 
 
-def summarize(performance: Performance) -> Row:
+def summarize(performance: Performance, frames: Iterable[FrameMotion] | None = None) -> Row:
     """Summarize a performance in one row.
 
     Args:
         performance: any performance.
+        frames: its motion, as for `pianomime.players.body.body_metrics`.
 
     Returns:
         `song`, `player` and `effort`; `song_seconds` and `frames`; `music`, an object with
@@ -126,7 +129,7 @@ def summarize(performance: Performance) -> Row:
         "touch": performance.touch,
         "world": performance.world,
         "music": json_of(asdict(performance.music())),
-        "body": json_of(asdict(body_metrics(performance))),
+        "body": json_of(asdict(body_metrics(performance, frames))),
         **{name: round(value, 6) for name, value in performance.metrics().items()},
         "plan_seconds": round(performance.plan_seconds, 3),
         "simulate_seconds": round(performance.simulate_seconds, 3),

@@ -6,14 +6,14 @@ plays as well as another. `docs/concepts/body.md` describes each metric.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE, KEYS
-from pianomime.players.motion import motion
+from pianomime.players.motion import FrameMotion, motion
 from pianomime.players.performance import Performance
 from pianomime.world.hand import hand_points
 from pianomime.world.layout import LAYOUT
@@ -91,18 +91,23 @@ class BodyMetrics:
     invalid: tuple[str, ...]
 
 
-def body_metrics(performance: Performance) -> BodyMetrics:
+def body_metrics(
+    performance: Performance, frames: Iterable[FrameMotion] | None = None
+) -> BodyMetrics:
     """Measure the hands of a performance, which is played again for it.
 
     Args:
         performance: with any number of controls a frame.
+        frames: its motion, for who looks at that as well; by default that of
+            `pianomime.players.motion.motion`.
     """
+    moving = motion(performance) if frames is None else frames
     whole = np.ones(len(performance), bool)
     whole[performance.blow_ups] = False
     found = {
         **_of_poses(performance.qpos[:, KEYS:], whole),
         **_of_controls(performance.ctrl),
-        **_of_motion(performance, whole),
+        **_of_motion(performance, moving, whole),
     }
     invalid = tuple(
         name for name, value in found.items() if value is not None and not np.isfinite(value)
@@ -155,7 +160,9 @@ def _of_controls(ctrl: NDArray[np.float64]) -> dict[str, float | None]:
     return _mean_and_worst("controls_at_end", at_end, ctrl)
 
 
-def _of_motion(performance: Performance, whole: NDArray[np.bool_]) -> dict[str, float | None]:
+def _of_motion(
+    performance: Performance, moving: Iterable[FrameMotion], whole: NDArray[np.bool_]
+) -> dict[str, float | None]:
     """Of all instants in frames that are whole; NaN if it is another motion than was kept."""
     another: dict[str, float | None] = dict.fromkeys(_OF_MOTION, np.nan)
     if not np.isfinite(performance.ctrl).all():
@@ -167,7 +174,7 @@ def _of_motion(performance: Performance, whole: NDArray[np.bool_]) -> dict[str, 
     # Only the greatest of each instant are kept: a performance may last for hours.
     instants: list[NDArray[np.float64]] = []
     at_limit: list[NDArray[np.float64]] = []
-    for frame, moved in enumerate(motion(performance)):
+    for frame, moved in enumerate(moving):
         if not moved.same:
             return another
         if not whole[frame]:

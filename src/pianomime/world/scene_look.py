@@ -7,6 +7,7 @@ crude they are hidden behind skins without mass or contact, each the convex hull
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import mujoco
@@ -17,20 +18,46 @@ from pianomime.keyboard import BLACK, KEYS
 from pianomime.palette import DARK, rgb
 from pianomime.world.parameters import key_centres
 
-CAMERAS = ("player", "top", "side")
-"""Names of the cameras: over the player's shoulders, from straight above, from the treble end."""
+
+@dataclass(frozen=True)
+class View:
+    """Where a camera or a light stands, and at what it looks.
+
+    Attributes:
+        pos: its place [m], world frame.
+        target: the point in the middle of what it sees [m].
+        fovy: vertical field of view of a camera [degrees].
+    """
+
+    pos: tuple[float, float, float]
+    target: tuple[float, float, float]
+    fovy: float = 45.0
+
+
+# A narrow view from afar keeps the outer keys from fanning out.
+CAMERA_VIEWS = {
+    "player": View((1.22, 0.0, 1.50), (0.075, 0.0, 0.0), 17.5),
+    "top": View((0.10, 0.0, 2.20), (0.0999, 0.0, 0.0), 16.0),
+    "side": View((0.62, 0.80, 0.42), (0.09, 0.06, 0.02), 34.0),
+}
+"""Cameras: over the player's shoulders, from straight above, from the treble end."""
+CAMERAS = tuple(CAMERA_VIEWS)
+LIGHT_VIEW = View((0.8, -1.15, 2.4), (0.08, -0.07, 0.0))
+"""The light that casts shadows."""
 
 WHITE_KEY = (0.93, 0.92, 0.89)
 BLACK_KEY = (0.07, 0.07, 0.08)
 PRESSED_KEY = (0.25, 0.78, 0.42)
 LAMP_OFF = (0.07, 0.07, 0.08)
+BACKGROUND = (0.20, 0.22, 0.27)
 """Colours (red, green, blue), 0..1."""
 
 _ACCENT = {
     side: tuple(part / 255 for part in rgb(colour))
     for side, colour in zip(("lh", "rh"), DARK.hands[:2], strict=True)
 }
-_HIDDEN_GROUP = 3
+HIDDEN_GROUP = 3
+"""Of shapes that are not shown, for they are behind a skin."""
 _SKIN_GROUP = 1
 
 _Sphere: TypeAlias = tuple[tuple[float, float, float], float]
@@ -151,7 +178,7 @@ def _add_scenery(spec: mujoco.MjSpec) -> None:
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=(0.20, 0.22, 0.27),
+        rgb1=BACKGROUND,
         rgb2=(0.05, 0.05, 0.07),
         width=64,
         height=384,
@@ -160,8 +187,8 @@ def _add_scenery(spec: mujoco.MjSpec) -> None:
     world.add_light(
         name="key_light",
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=(0.8, -1.15, 2.4),
-        dir=(-0.30, 0.45, -1.0),
+        pos=LIGHT_VIEW.pos,
+        dir=np.subtract(LIGHT_VIEW.target, LIGHT_VIEW.pos),
         diffuse=(0.62, 0.60, 0.57),
         specular=(0.45, 0.45, 0.45),
         castshadow=True,
@@ -214,21 +241,17 @@ def _add_lamps(spec: mujoco.MjSpec) -> None:
 
 
 def _add_cameras(spec: mujoco.MjSpec) -> None:
-    # A narrow view from afar keeps the outer keys from fanning out.
-    for name, pos, target, fovy in (
-        ("player", (1.22, 0.0, 1.50), (0.075, 0.0, 0.0), 17.5),
-        ("top", (0.10, 0.0, 2.20), (0.0999, 0.0, 0.0), 16.0),
-        ("side", (0.62, 0.80, 0.42), (0.09, 0.06, 0.02), 34.0),
-    ):
-        assert name in CAMERAS
-        spec.worldbody.add_camera(name=name, pos=pos, quat=_look_at(pos, target), fovy=fovy)
+    for name, view in CAMERA_VIEWS.items():
+        spec.worldbody.add_camera(
+            name=name, pos=view.pos, quat=_look_at(view.pos, view.target), fovy=view.fovy
+        )
 
 
 def _dress_body(spec: mujoco.MjSpec, body: mujoco.MjsBody, side: str, name: str) -> None:
     skins = _SKINS.get(name, ())
     for geom in body.geoms:
         if skins:
-            geom.group = _HIDDEN_GROUP
+            geom.group = HIDDEN_GROUP
             continue
         if name.endswith("distal"):
             material = f"accent_{side}"
