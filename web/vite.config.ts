@@ -1,0 +1,19 @@
+import { defineConfig } from "vite";
+
+/**
+ * One build makes one module with everything in it, so that a page needs one file and no other:
+ * `vite build --mode NAME` makes NAME.js from src/NAME.ts.
+ */
+export default defineConfig(({ mode }) => ({
+  publicDir: false,
+  build: {
+    outDir: "../src/pianomime/replay/page",
+    emptyOutDir: false,
+    target: "es2022",
+    modulePreload: false,
+    lib: { entry: `src/${mode}.ts`, formats: ["es"], fileName: () => `${mode}.js` },
+    rolldownOptions: {
+      output: { minify: true, comments: { legal: true, annotation: false, jsdoc: false } },
+    },
+  },
+}));
