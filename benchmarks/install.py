@@ -42,7 +42,7 @@ def main() -> None:
         began = time.perf_counter()
         run([*pip, target], folder)
         installed = time.perf_counter()
-        song = ["ode-to-joy", "--seconds", "2", "--no-video", "-o", "out"]
+        song = ["ode-to-joy", "--seconds", "2", "-o", "out"]
         run([str(scripts / "pianomime"), "play", *song], folder)
         played = time.perf_counter()
         size = sum(file.stat().st_size for file in (folder / "env").rglob("*") if file.is_file())

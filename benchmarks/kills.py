@@ -110,7 +110,7 @@ _SONGS = ["{inputs}/songs"]
 _EXPERTS = ["--experts", "{inputs}/experts.zarr"]
 CASES = {
     "play": Case(
-        ["play", "{inputs}/songs/0.mid", "-o", "out", "--effort=0", "--no-video"],
+        ["play", "{inputs}/songs/0.mid", "-o", "out", "--effort=0"],
         ["songs"],
     ),
     "evaluate": Case(

@@ -32,7 +32,7 @@ def play(song: Path, seconds: float, effort: int, cores: list[int]) -> dict[str,
         process = subprocess.Popen(
             [
                 *(sys.executable, "-m", "pianomime", "play", str(song), "-o", str(out)),
-                *("--no-video", "--lead-in", "0", "--seconds", str(seconds)),
+                *("--lead-in", "0", "--seconds", str(seconds)),
                 *("--effort", str(effort)),
             ],
             stdout=subprocess.DEVNULL,

@@ -77,7 +77,7 @@ def test_bundled_songs_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_play_writes_the_whole_report(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["play", "ode-to-joy", "-o", "out", "--seconds", "2", "--no-video"])
+    main(["play", "ode-to-joy", "-o", "out", "--seconds", "2"])
     row = json.loads(Path("out/report.json").read_text(encoding="utf-8"))
     assert row["player"] == "zero-shot"
     assert 0 < row["f1"] <= 1
@@ -92,7 +92,7 @@ def test_play_writes_the_whole_report(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_play_goes_to_a_folder_named_after_the_song_by_default() -> None:
     Path("my song.MID").write_bytes(songs.path("beethoven-ode-to-joy").read_bytes())
-    main(["play", "my song.MID", "--seconds", "1", "--no-video"])
+    main(["play", "my song.MID", "--seconds", "1"])
     assert Path("out/my song/report.html").exists()
 
 

@@ -98,7 +98,7 @@ def test_a_song_with_an_odd_name_is_played(
         song.write_bytes(made_up_midi(tmp_path))
     except OSError:
         pytest.skip("the file system does not allow this name")
-    main(["play", str(song), "--no-video", *BRIEF])
+    main(["play", str(song), *BRIEF])
 
     said = capsys.readouterr()
     assert not acting(said.out + said.err)

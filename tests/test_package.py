@@ -125,7 +125,7 @@ def test_the_installed_wheel_plays(wheel: Path, tmp_path: Path) -> None:
     assert Path(where.strip()).is_relative_to(tmp_path)
     command = str(scripts / "pianomime")
     assert run([command, "--version"], tmp_path).split() == ["pianomime", pianomime.__version__]
-    run([command, "play", "ode-to-joy", "--seconds", "2", "--no-video", "-o", "out"], tmp_path)
+    run([command, "play", "ode-to-joy", "--seconds", "2", "-o", "out"], tmp_path)
     assert (tmp_path / "out" / "report.html").exists()
 
 

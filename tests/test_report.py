@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import base64
 import errno
+import gzip
 import json
 import os
+import re
 import tracemalloc
 from collections.abc import Iterable
 from dataclasses import replace
@@ -24,6 +27,9 @@ from pianomime.evaluation.summary import summarize
 from pianomime.files import staged
 from pianomime.music import Score
 from pianomime.music.sound import Sound
+from pianomime.players.motion import motion
+from pianomime.replay import PageMissing, Poses
+from pianomime.replay.replay import replay_blocks
 from pianomime.report import DARK, FILES, LIGHT, Theme, draw, write_report
 from pianomime.report.mp3 import write_mp3
 from pianomime.world.render import RenderUnavailable
@@ -33,6 +39,16 @@ PROTOCOL = (
     "music", "body", "precision", "recall", "f1", "onset_f1", "plan_seconds", "simulate_seconds",
     "realtime_factor",
 )  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def script(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A script of the page, which may not be built here."""
+    monkeypatch.setattr("pianomime.report.write.page_script", lambda: "made_up_script()")
+
+
+def quiet(*_: object) -> None:
+    pass
 
 
 def test_numbers_hold_what_was_agreed() -> None:
@@ -69,6 +85,7 @@ def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) ->
     assert {file.name for file in tmp_path.iterdir()} == set(FILES) - {
         "performance.mp4",
         "performance.mp3",
+        "performance.replay.gz",
         "score.mp3",
     }
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == row
@@ -91,6 +108,40 @@ def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) ->
     sources = Page(html).sources
     assert len(sources) == 4
     assert all(source.startswith("data:") for source in sources)
+    ((kind, embedded),) = re.findall(
+        r'<script type="(application/octet-stream)" id="replay-data">([^<]*)<', html
+    )
+    poses = Poses(performance)
+    blocks = replay_blocks(
+        performance, summarize(performance, poses.of(motion(performance))), poses
+    )
+    assert kind == "application/octet-stream"
+    assert gzip.decompress(base64.b64decode(embedded)) == b"".join(blocks)
+    assert html.count("made_up_script") == 1
+
+
+def test_a_script_cannot_end_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "pianomime.report.write.page_script", lambda: "text = '</script><b id=\"out\">'"
+    )
+    write_report(made_up.performance(made_up.score(notes=3)), tmp_path, False, quiet, pytest.fail)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "text = '<\\/script><b id=" in html
+
+
+def test_without_the_script_one_line_says_so_and_the_rest_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing() -> str:
+        raise PageMissing("no hands in the page")
+
+    monkeypatch.setattr("pianomime.report.write.page_script", missing)
+    notes: list[str] = []
+    write_report(made_up.performance(made_up.score(notes=3)), tmp_path, False, quiet, notes.append)
+    assert notes == ["no hands in the page"]
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<script" not in html
+    assert len(Page(html).sources) == 4
 
 
 def test_large_files_stand_beside_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,7 +151,8 @@ def test_large_files_stand_beside_the_page(tmp_path: Path, monkeypatch: pytest.M
     )
     sources = Page((tmp_path / "report.html").read_text(encoding="utf-8")).sources
     assert sources == [
-        "performance.mp3", "score.mp3", "piano_roll_dark.png", "piano_roll.png",
+        "performance.replay.gz", "piano_roll_dark.png", "piano_roll.png", "performance.mp3",
+        "score.mp3",
     ]  # fmt: skip
     assert {file.name for file in tmp_path.iterdir()} == set(FILES) - {"performance.mp4"}
     for name in ("performance.mp3", "score.mp3"):
@@ -195,7 +247,7 @@ def test_the_film_lights_what_sounds_and_tells_phantoms_apart(
     score = Score(
         np.array([40, 44]), np.array([0.0, 1.0]), np.array([0.5, 2.0]), np.array([64, 64])
     )
-    # One is played late, one beside its key, for less than a frame and between two frames' ends.
+    # One is played late, one beside its key, for less than a frame of the player's.
     performance = replace(
         made_up.performance(score),
         event_key=np.array([40, 45]),
@@ -213,9 +265,9 @@ def test_the_film_lights_what_sounds_and_tells_phantoms_apart(
     write_report(performance, tmp_path, True, lambda *_: None, pytest.fail)
     ((sounding, colours),) = films
     lit = np.argwhere(sounding).tolist()
-    assert lit == [[frame, 40] for frame in range(1, 10)] + [[20, 45]]
+    assert lit == [[picture, 40] for picture in range(3, 30)] + [[60, 45], [61, 45], [62, 45]]
     red = (colours[..., :3] == np.float32(to_rgb(LIGHT.wrong))).all(axis=-1)
-    assert np.argwhere(red).tolist() == [[20, 45]]
+    assert np.argwhere(red).tolist() == [[60, 45], [61, 45], [62, 45]]
 
 
 @pytest.mark.parametrize("seconds", [1.0, 60.0])
@@ -328,6 +380,6 @@ def test_a_film_is_made_where_there_is_opengl(tmp_path: Path) -> None:
     if notes:
         pytest.skip(notes[0])
     with av.open(str(tmp_path / "performance.mp4")) as film:
-        assert sum(1 for _ in film.decode(video=0)) == len(performance)
+        assert sum(1 for _ in film.decode(video=0)) == 3 * len(performance)
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert sum(source.startswith("data:video/mp4") for source in Page(html).sources) == 1

@@ -50,9 +50,9 @@ def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_the_report_is_that_of_the_player(capsys: pytest.CaptureFixture[str]) -> None:
-    main(["play", "ode-to-joy", "--effort", "0", "--seconds", "1", "--no-video", "-o", "played"])
+    main(["play", "ode-to-joy", "--effort", "0", "--seconds", "1", "-o", "played"])
     told = capsys.readouterr().out
-    main(["report", "played/performance.npz", "--no-video", "-o", "shown"])
+    main(["report", "played/performance.npz", "-o", "shown"])
     assert capsys.readouterr().out == told.replace("played/", "shown/")
     assert {file.name for file in Path("shown").iterdir()} == FILES
     for name in FILES - {"performance.npz"}:  # A zip file holds the time at which it was made.
@@ -70,7 +70,7 @@ def test_the_report_is_that_of_the_player(capsys: pytest.CaptureFixture[str]) ->
 def test_where_the_report_goes(name: str, out: str, performance: Performance) -> None:
     Path("songs").mkdir()
     performance.save(name)
-    main(["report", name, "--no-video"])
+    main(["report", name])
     (folder,) = Path().glob(out) if out != "." else [Path()]
     assert {file.name for file in folder.iterdir()} - {"songs"} == FILES
     row = json.loads((folder / "report.json").read_text(encoding="utf-8"))
@@ -113,7 +113,7 @@ def test_a_player_of_one_excerpt_takes_what_it_was_trained_with(
     register_player("one-excerpt", lambda effort, seed: OfOneExcerpt())
     song = ["ode-to-joy", "--player", "one-excerpt"]
     trained = ["--start", "0.5", "--seconds", "1", "--effort", "0"]
-    main(["play", *song, *trained, "--no-video", "-o", "played"])
+    main(["play", *song, *trained, "-o", "played"])
     # It begins with the music; of half a second before it, the default, nothing is left.
     assert Performance.load("played/performance.npz").score.onset[0] == 0.0
     main(["evaluate", *song, "--seconds", "1", "-o", "evaluated"])
@@ -126,5 +126,5 @@ def test_a_player_of_one_excerpt_takes_what_it_was_trained_with(
     for command in ("play", "evaluate"):
         told = fails([command, *song, "--lead-in", "0.5", "-o", "other"], capsys)
         assert "lead-in 0.5: one-excerpt plays music of its own" in told
-    main(["play", *song, "--lead-in", "0", "--no-video", "-o", "played"])
+    main(["play", *song, "--lead-in", "0", "-o", "played"])
     assert sorted(os.listdir()) == ["evaluated", "played"]

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE
 
-_FPS = round(FRAME_RATE)
 _SHRINKING = av.video.reformatter.Interpolation.AREA
 
 
 class Mp4:
-    """A film of 20 pictures per second. Use it as a context manager.
+    """A film. Use it as a context manager.
 
     Memory does not grow with the film, because picture and sound of a frame are written together.
     """
@@ -30,6 +29,7 @@ class Mp4:
         size: tuple[int, int],
         sample_rate: int | None,
         crf: int = 20,
+        fps: int = round(FRAME_RATE),
     ) -> None:
         """Open the file.
 
@@ -38,18 +38,19 @@ class Mp4:
             size: width and height of the film, both even [pixels].
             sample_rate: of its sound [Hz]; None for a silent film.
             crf: x264's constant rate factor: smaller is better and larger.
+            fps: pictures per second.
 
         Raises:
             OSError: the file cannot be written.
         """
-        self._size, self._rate = size, sample_rate
+        self._size, self._rate, self._fps = size, sample_rate, fps
         self._frame = 0
         # In full: a relative name with a colon would be taken for an address. An index at the front
         # lets a browser start before it has loaded the whole file.
         self._file = av.open(
             os.path.abspath(path), "w", format="mp4", options={"movflags": "+faststart"}
         )
-        self._pictures: Any = self._file.add_stream("libx264", rate=_FPS)
+        self._pictures: Any = self._file.add_stream("libx264", rate=fps)
         self._pictures.width, self._pictures.height = size
         self._pictures.pix_fmt = "yuv420p"
         self._pictures.options = {"crf": str(crf), "preset": "veryfast"}
@@ -60,7 +61,9 @@ class Mp4:
     @property
     def span(self) -> tuple[int, int]:
         """First sample of the sound of the next frame, and the one after its last."""
-        begin, end = (round(at * (self._rate or 0) / _FPS) for at in (self._frame, self._frame + 1))
+        begin, end = (
+            round(at * (self._rate or 0) / self._fps) for at in (self._frame, self._frame + 1)
+        )
         return begin, end
 
     def add(self, picture: NDArray[np.uint8], sound: NDArray[np.float32] | None = None) -> None:
@@ -72,7 +75,7 @@ class Mp4:
         """
         large = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
         shown = large.reformat(*self._size, "yuv420p", interpolation=_SHRINKING)
-        shown.pts, shown.time_base = self._frame, Fraction(1, _FPS)
+        shown.pts, shown.time_base = self._frame, Fraction(1, self._fps)
         self._file.mux(self._pictures.encode(shown))
         if self._sound is not None:
             begin, end = self.span

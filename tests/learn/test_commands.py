@@ -41,7 +41,7 @@ def test_an_expert_is_trained_and_plays(capsys: pytest.CaptureFixture[str]) -> N
     assert (config.total_steps, config.search.variations) == (200, 4)
     told = capsys.readouterr().out
     assert "pianomime play demo.npz --player run" in told
-    main(["play", "demo.npz", "--player", "run", "--no-video", "-o", "report"])
+    main(["play", "demo.npz", "--player", "run", "-o", "report"])
     row = json.loads(Path("report/report.json").read_text())
     assert f"F1 {row['f1']:.3f}" in told
     assert row["player"] == "expert"
@@ -58,7 +58,7 @@ def test_a_bundled_song_needs_no_demonstration() -> None:
     main(["train-expert", "ode-to-joy", *quick])
     run = ExpertRun.load(Path("out/expert-ode-to-joy-paper"))
     assert run.demonstration.source == "zero-shot plan"
-    main(["play", "ode-to-joy", "--player", str(run.path), "--no-video", "-o", "report"])
+    main(["play", "ode-to-joy", "--player", str(run.path), "-o", "report"])
 
 
 def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,7 +74,7 @@ def test_what_cannot_be_done_is_one_line(capsys: pytest.CaptureFixture[str]) -> 
     assert "--start 1: run plays the excerpt" in fails(
         ["play", "demo.npz", "--player", "run", "--start", "1"], capsys
     )
-    assert "not the score" in fails(["play", "ode-to-joy", "--player", "run", "--no-video"], capsys)
+    assert "not the score" in fails(["play", "ode-to-joy", "--player", "run"], capsys)
     assert "no runs" in fails(["collect"], capsys)
     assert "no demonstrations" in fails(["train-experts", "other"], capsys)
 

@@ -191,7 +191,22 @@ def test_another_motion_leaves_the_poses_that_were_kept(performance: Performance
     row = summarize(moved, poses.of(motion(moved)))
     assert "rail_speed_max" in row["body"]["invalid"]
     assert poses.rate == 20
-    np.testing.assert_array_equal(poses.positions[1:], moved.qpos)
+    assert len(poses) == 1 + len(moved)
+    found = positions([("MOVE", b[8:]) for b in poses.blocks()], 142)
+    np.testing.assert_allclose(found[1:], moved.qpos, atol=UNIT)
+    np.testing.assert_array_equal(poses.at(3 / 20), moved.qpos[2])
+
+
+def test_between_two_poses_joints_move_straight(performance: Performance) -> None:
+    poses = Poses(performance)
+    for _ in poses.of(motion(performance)):
+        pass
+    for frame in (0, 7, len(performance) - 1):
+        np.testing.assert_allclose(poses.at((frame + 1) / 20), performance.qpos[frame], atol=UNIT)
+    early, late = poses.at(1.0), poses.at(1.01)
+    np.testing.assert_allclose(poses.at(1.0025), 0.75 * early + 0.25 * late, atol=1e-12)
+    np.testing.assert_array_equal(poses.at(1e6), poses.at((len(poses) - 1) / poses.rate))
+    assert not poses.at(0.0).any()
 
 
 def test_positions_of_any_size_keep_their_place() -> None:

@@ -307,7 +307,7 @@ def test_the_command_writes_all_or_nothing(video, midi, hands, tmp_path, capsys)
     with av.open(str(overlay.path)) as film:
         assert not film.streams.audio  # nor has the video
     assert "Where tracking was poor" in (tmp_path / "new" / "demo-seen.html").read_text("utf-8")
-    cli.main(["play", str(out), "--no-video", "--seconds", "1", "-o", str(tmp_path / "played")])
+    cli.main(["play", str(out), "--seconds", "1", "-o", str(tmp_path / "played")])
     assert (tmp_path / "played" / "report.json").exists()
 
 

@@ -28,7 +28,7 @@ def test_one_line_says_why_there_is_no_film(
     named: str, lacking: dict[str, str], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    options = ["--seconds", "0.5", "--effort", "0", "-o", str(out)]
+    options = ["--seconds", "0.5", "--effort", "0", "--video", "-o", str(out)]
     done = subprocess.run(
         [sys.executable, "-m", "pianomime", "play", "c-major-study", *options],
         env={**lacking, "MUJOCO_GL": named},

@@ -22,7 +22,7 @@ class Play:
     """Play a song with two simulated hands, and report on it.
 
     OUT then holds a page to look at and listen to (report.html), the metrics (report.json), the
-    performance as arrays (performance.npz), and MIDI, WAV, pictures and a film of it.
+    performance as arrays (performance.npz), and MIDI, WAV and pictures of it.
 
     Settings of the player are options too, such as --planner.beam 200: `pianomime players
     zero-shot` lists those of the zero-shot player.
@@ -37,7 +37,7 @@ class Play:
 
     Examples:
       pianomime play ode-to-joy
-      pianomime play SONG.mid -o out/song --no-video
+      pianomime play SONG.mid -o out/song --video
       pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
       pianomime play SONG.mid --lead-in 0
@@ -77,8 +77,8 @@ class Play:
     lead_in: Annotated[float | None, tyro.conf.arg(metavar="S", help_behavior_hint="")] = None
     """Silence before the first sound, in which the hands get to their keys [s]; it is no part of
     --seconds. 0.5 if not given, and 0 for experts and plans of demonstrations, which have none."""
-    video: bool = True
-    """Render a film, where this machine can."""
+    video: bool = False
+    """Render a film of 60 pictures a second too, where this machine can."""
 
     def run(self) -> None:
         """Play and write the report.

@@ -24,11 +24,11 @@ class Report:
     """Show a saved performance: hear, see and score it again, without playing it.
 
     OUT then holds what `pianomime play` makes: a page to look at and listen to (report.html), the
-    metrics (report.json), the performance (performance.npz), and MIDI, WAV, pictures and a film.
+    metrics (report.json), the performance (performance.npz), and MIDI, WAV and pictures.
 
     Examples:
       pianomime report out/fur-elise/performance.npz
-      pianomime report out/fur-elise/performance.npz -o out/shown --no-video
+      pianomime report out/fur-elise/performance.npz -o out/shown --video
       pianomime report out/all/songs/SONG.npz
     """
 
@@ -39,8 +39,8 @@ class Report:
     ] = None
     """Folder for the report; by default that of a performance.npz, and for a file of another name a
     folder of that name beside it."""
-    video: bool = True
-    """Render a film, where this machine can."""
+    video: bool = False
+    """Render a film of 60 pictures a second too, where this machine can."""
 
     def run(self) -> None:
         """Read the performance and write the report.

@@ -19,6 +19,8 @@ POSE_SUBSTEPS = 2
 motion is to be seen."""
 POSES_PER_SECOND = round(1 / (POSE_SUBSTEPS * PHYSICS_DT))
 
+_BLOCK_SECONDS = 10
+
 UNIT = 1e-4
 """[rad, m] Positions are stored as whole numbers of it."""
 _LARGEST = np.iinfo(np.int16).max * UNIT
@@ -31,11 +33,7 @@ def move_block(first: int, positions: NDArray[np.float64]) -> bytes:
         first: number of the first pose.
         positions: (N, q) positions of all joints [rad, m]; farther than 3.27 from 0 they are cut.
     """
-    whole = np.rint(np.clip(positions, -_LARGEST, _LARGEST) / UNIT).astype("<i2")
-    # Differences compress to a fraction; they wrap around, and so does their sum.
-    changes = np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]), "<i2"))
-    head = struct.pack("<II", first, len(whole))
-    return block("MOVE", head + np.ascontiguousarray(changes.T, "<i2").tobytes())
+    return _packed(first, _whole(positions))
 
 
 class Poses:
@@ -46,8 +44,9 @@ class Poses:
     """
 
     def __init__(self, performance: Performance) -> None:
-        rest = np.zeros((1, performance.qpos.shape[1]))
-        self._kept, self._found, self._same = performance.qpos, [rest], True
+        self._kept, self._same = performance.qpos, True
+        # Of an hour they take 100 MB like this, and four times as much as they come.
+        self._found = [np.zeros((1, performance.qpos.shape[1]), np.int16)]
 
     def of(self, frames: Iterable[FrameMotion]) -> Iterator[FrameMotion]:
         """Pass on the motion of every frame, and take down its poses.
@@ -58,26 +57,71 @@ class Poses:
         for frame, kept in zip(frames, self._kept, strict=True):
             found = np.hstack([frame.keys, frame.position])[POSE_SUBSTEPS::POSE_SUBSTEPS]
             # Where the physics broke, what came before the recovery may be no number.
-            self._found.append(np.where(np.isfinite(found), found, kept))
+            self._found.append(_whole(np.where(np.isfinite(found), found, kept)))
             self._same &= frame.same
             yield frame
 
     @property
     def rate(self) -> int:
-        """Poses per second."""
-        return POSES_PER_SECOND if self._whole else round(FRAME_RATE)
+        """Poses per second.
 
-    @property
-    def positions(self) -> NDArray[np.float64]:
-        """(N, 142) The positions of all joints, the first at 0 s [rad, m].
-
-        Where not every frame was looked at, or playing the controls again gave another motion, as
-        on a machine that rounds otherwise, they are those that the performance has kept, of which
-        there are fewer.
+        They are fewer, those that the performance has kept, where not every frame was looked at, or
+        playing the controls again gave another motion, as on a machine that rounds otherwise.
         """
-        return np.vstack(self._found if self._whole else [self._found[0], self._kept])
+        return POSES_PER_SECOND if self._complete else round(FRAME_RATE)
+
+    def __len__(self) -> int:
+        """Number of poses."""
+        return sum(map(len, self._found)) if self._complete else 1 + len(self._kept)
+
+    def at(self, seconds: float) -> NDArray[np.float64]:
+        """(142,) The positions of all joints at a time, between two poses on a straight line.
+
+        Args:
+            seconds: from the beginning [s]; after the last pose, that counts.
+        """
+        place = min(seconds * self.rate, len(self) - 1)
+        before, part = int(place), place % 1
+        first, second = (self._pose(at) for at in (before, min(before + 1, len(self) - 1)))
+        between: NDArray[np.float64] = first + part * (second - first)
+        return between
+
+    def blocks(self) -> Iterator[bytes]:
+        """Blocks of all poses, as `move_block` makes them, one after the other."""
+        parts = self._found if self._complete else [self._found[0], _whole(self._kept)]
+        first, gathered = 0, list[NDArray[np.int16]]()
+        for part in parts:
+            gathered.append(part)
+            if sum(map(len, gathered)) >= _BLOCK_SECONDS * self.rate:
+                yield _packed(first, np.vstack(gathered))
+                first += sum(map(len, gathered))
+                gathered.clear()
+        if gathered:
+            yield _packed(first, np.vstack(gathered))
 
     @property
-    def _whole(self) -> bool:
+    def _complete(self) -> bool:
         """Whether all frames were looked at, and moved as they have before."""
         return self._same and len(self._found) == 1 + len(self._kept)
+
+    def _pose(self, number: int) -> NDArray[np.float64]:
+        pose: NDArray[np.float64]
+        if not number:
+            pose = self._found[0][0] * UNIT
+        elif self._complete:
+            frame, place = divmod(number - 1, len(self._found[-1]))
+            pose = self._found[1 + frame][place] * UNIT
+        else:
+            pose = self._kept[number - 1]
+        return pose
+
+
+def _whole(positions: NDArray[np.float64]) -> NDArray[np.int16]:
+    return np.rint(np.clip(positions, -_LARGEST, _LARGEST) / UNIT).astype(np.int16)
+
+
+def _packed(first: int, whole: NDArray[np.int16]) -> bytes:
+    # Differences compress to a fraction; they wrap around, and so does their sum.
+    changes = np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]), np.int16))
+    head = struct.pack("<II", first, len(whole))
+    return block("MOVE", head + np.ascontiguousarray(changes.T, "<i2").tobytes())

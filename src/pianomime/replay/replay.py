@@ -14,13 +14,12 @@ from pianomime.music import Score
 from pianomime.players.performance import Performance
 from pianomime.replay.blocks import json_block
 from pianomime.replay.notes import Judgement, heard_block, notes_block, pedal_block
-from pianomime.replay.poses import Poses, move_block
+from pianomime.replay.poses import Poses
 from pianomime.replay.scene import scene_block
 from pianomime.shown import shown
 from pianomime.world.layout import LAYOUT
 
 _FORMAT, _VERSION = "pianomime-replay", 1
-_BLOCK_SECONDS = 10
 _EFFORT = 6
 """Of compression: more saves a hundredth and takes three times as long."""
 
@@ -86,7 +85,6 @@ def replay_blocks(performance: Performance, row: Row, poses: Poses) -> Iterator[
         One block after the other, in the order in which a page can use them soonest.
     """
     score, judgement = performance.score, Judgement.of(performance)
-    rate, positions = poses.rate, poses.positions
     yield head_block(
         score,
         performance.player,
@@ -94,14 +92,13 @@ def replay_blocks(performance: Performance, row: Row, poses: Poses) -> Iterator[
         performance.world,
         performance.touch,
         performance.works_pedal,
-        rate,
+        poses.rate,
     )
     yield scene_block()
     yield notes_block(score, performance.plan, judgement)
     yield heard_block(performance.played(), 0, judgement)
     yield pedal_block(performance.pedal_times)
-    for first in range(0, len(positions), _BLOCK_SECONDS * rate):
-        yield move_block(first, positions[first : first + _BLOCK_SECONDS * rate])
+    yield from poses.blocks()
     yield done_block(row)
 
 

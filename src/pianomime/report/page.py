@@ -1,6 +1,6 @@
-"""`report.html`: one page with film, sound, pictures and metrics, without the network.
+"""`report.html`: one page with a replay, sound, a picture and metrics, without the network.
 
-It holds everything itself, but for the sound and the film of long pieces, which stand beside it.
+It holds everything itself, but for what long pieces are made of, which stands beside it.
 """
 
 from __future__ import annotations
@@ -26,35 +26,36 @@ _STYLE = """\
 .tiles dt { color: var(--faint); font-size: .85rem; }
 .tiles dd { margin: 0; font-size: 1.65rem; font-weight: 650; font-variant-numeric: tabular-nums; }
 .tiles div:first-child dd { color: var(--left); }
-.sounds {
-  display: grid; grid-template-columns: repeat(auto-fit, minmax(280px, 1fr)); gap: 1rem;
-}
-.sounds p { margin: 0 0 .4rem; }
+figure { margin: .9rem 0 0; }
+figcaption { margin-bottom: .4rem; }
 """
 _BODY = Template("""\
 <h1>$song</h1>
 <p class="under">Played by two simulated Shadow hands &middot; player <b>$player</b>,
 effort $effort</p>
-$warning<dl class="tiles">
+$warning$replay<dl class="tiles">
 $tiles</dl>
-$film<section>
-<h2>Sound</h2>
-<div class="sounds">
-<div><p>What the hands played</p><audio controls src="$played"></audio></div>
-<div><p>What the score asks for</p><audio controls src="$wanted"></audio></div>
-</div>
-</section>
-<section>
-<h2>Piano roll</h2>
-<picture>
-<source media="(prefers-color-scheme: dark)" srcset="$dark_picture">
-<img alt="Piano roll: notes played and missed, coloured by hand, and phantom notes" src="$picture">
-</picture>
-</section>
 $tables<footer>Made by PianoMime $version. Note F1 compares when each key was struck with when the
 score asks for it, and velocity F1 also how hard; a phantom note is a strike that nobody asked for.
 No lag is taken off. Protocol <code>$protocol</code>, touch <code>$touch</code>.</footer>
 """)
+
+# What is in the element is shown where there is no WebGL, or no script.
+_REPLAY = Template("""\
+<section class="replay">
+<pianomime-replay$address>
+$film<picture slot="picture">
+<source media="(prefers-color-scheme: dark)" srcset="$dark_picture">
+<img alt="Piano roll: notes played and missed, coloured by hand, and phantom notes" src="$picture">
+</picture>
+<figure slot="sound"><figcaption>What the hands played</figcaption>
+<audio controls src="$played"></audio></figure>
+<figure slot="wanted"><figcaption>What the score asks for</figcaption>
+<audio controls src="$wanted"></audio></figure>
+</pianomime-replay>
+</section>
+$data$script""")
+_DATA_ID = "replay-data"
 
 _TILES = MUSIC[:-1]
 """Those whose value is one number."""
@@ -75,8 +76,12 @@ _TABLES = {
 }
 """Tables by their headings."""
 
+REPLAY_TYPE = "application/octet-stream"
+_BASE64 = f"data:{REPLAY_TYPE};base64,"
+
 MOST_EMBEDDED = 16 * 1024**2
-"""[bytes] Larger files stand beside the page: sound of more than 17 minutes, and long films."""
+"""[bytes] Larger files stand beside the page: sound of more than 17 minutes, replays of more than
+25, and long films."""
 
 
 def page(
@@ -87,6 +92,8 @@ def page(
     picture: str,
     dark_picture: str,
     film: str | None,
+    replay: str,
+    script: str | None,
 ) -> str:
     """Make the report as one HTML page.
 
@@ -98,15 +105,11 @@ def page(
         picture: of a picture of the piano roll for light pages.
         dark_picture: of one for dark pages.
         film: of the film of the performance, or None.
+        replay: of the replay of the performance.
+        script: JavaScript module that shows it, or None where there is none.
     """
     tiles = (f"<div><dt>{tile.label}</dt><dd>{tile.show(summary)}</dd></div>\n" for tile in _TILES)
-    film_section = warning = ""
-    if film is not None:
-        film_section = (
-            "<section>\n<h2>Video</h2>\n"
-            f'<video controls preload="metadata" src="{film}"></video>\n'
-            "</section>\n"
-        )
+    warning = ""
     if summary["blow_ups"]:
         warning = (
             '<section class="warning">The physics became unstable during this performance, and the '
@@ -126,14 +129,45 @@ def page(
         tables="".join(_table(heading, rows, summary) for heading, rows in _TABLES.items()),
         protocol=escape(str(summary["protocol"])),
         touch=escape(str(summary["touch"])),
-        film=film_section,
         warning=warning,
+        replay=_replay(played, wanted, picture, dark_picture, film, replay, script),
+    )
+    return web_page(f"{summary['song']} - PianoMime", body, _STYLE)
+
+
+def _replay(
+    played: str,
+    wanted: str,
+    picture: str,
+    dark_picture: str,
+    film: str | None,
+    replay: str,
+    script: str | None,
+) -> str:
+    embedded = replay.removeprefix(_BASE64) if replay.startswith(_BASE64) else None
+    address, data = f' src="{replay}"', ""
+    if embedded is not None:
+        # A page that was opened from a disk may read what it holds, but no file beside it.
+        address = f' data-from="{_DATA_ID}"'
+        data = f'<script type="{REPLAY_TYPE}" id="{_DATA_ID}">{embedded}</script>\n'
+    if script is None:
+        address = data = ""
+    return _REPLAY.substitute(
+        address=address,
+        data=data,
+        script="" if script is None else _module(script),
+        film="" if film is None else f'<video slot="film" controls src="{film}"></video>\n',
         played=played,
         wanted=wanted,
         picture=picture,
         dark_picture=dark_picture,
     )
-    return web_page(f"{summary['song']} - PianoMime", body, _STYLE)
+
+
+def _module(script: str) -> str:
+    # The end tag would end the script, also within a text of it.
+    safe = script.replace("</script", "<\\/script")
+    return f'<script type="module">\n{safe}\n</script>\n'
 
 
 def _table(heading: str, rows: tuple[Measure, ...], summary: Row) -> str:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -12,15 +13,17 @@ from numpy.typing import NDArray
 
 from pianomime import __version__
 from pianomime.evaluation.summary import Row, summarize
-from pianomime.keyboard import FRAME_RATE
+from pianomime.keyboard import KEYS
 from pianomime.music import Score, match_notes
 from pianomime.music.sound import BLOCK_SECONDS, Sound
 from pianomime.music.wav import WavFile, write_wav_blocks
 from pianomime.palette import DARK, LIGHT
+from pianomime.players.motion import motion
 from pianomime.players.performance import Performance
 from pianomime.progress import Progress, Steps, telling
+from pianomime.replay import PageMissing, Poses, page_script, write_replay
 from pianomime.report.mp3 import write_mp3
-from pianomime.report.page import page, source
+from pianomime.report.page import REPLAY_TYPE, page, source
 from pianomime.report.picture import draw
 from pianomime.world.render import RenderUnavailable, write_video
 from pianomime.world.scene_look import key_colours
@@ -36,11 +39,14 @@ FILES = (
     "piano_roll_dark.png",
     "performance.mp3",
     "score.mp3",
+    "performance.replay.gz",
 )
-"""All files of a report. The film may be missing, and so may the MP3s: they are in the page, but of
-a piece of more than 17 minutes."""
+"""All files of a report. The film is made if asked for; the MP3s and the replay are in the page,
+but of long pieces."""
 
 _SOUNDS = ("performance.mp3", "score.mp3")
+_REPLAY = "performance.replay.gz"
+_FILM_FPS = 60
 _PICTURES = {"piano_roll.png": LIGHT, "piano_roll_dark.png": DARK}
 _ENCODING = 3
 """Encoding a minute of sound takes as long as making it three times."""
@@ -58,7 +64,7 @@ def write_report(
     Args:
         performance: the performance to report on.
         folder: an existing folder for the files.
-        video: whether to render a video, if this machine can.
+        video: whether to render a film, if this machine can.
         progress: called in the phases "saving", "sound", "pictures", "rendering" and "page".
         note: called with one line that says what could not be made and why.
 
@@ -66,7 +72,9 @@ def write_report(
         The summary, as in `report.json`.
     """
     progress("saving", 0, 0)
-    row = summarize(performance)
+    poses = Poses(performance)
+    row = summarize(performance, poses.of(motion(performance)))
+    write_replay(folder / _REPLAY, performance, row, poses)
     played = performance.played()
     performance.save(folder / "performance.npz")
     played.to_midi(folder / "performance.mid")
@@ -78,13 +86,19 @@ def write_report(
             steps.advance(1)
     if video:
         try:
-            _write_film(performance, folder, progress)
+            _write_film(performance, poses, folder, progress)
         except RenderUnavailable as error:
             note(str(error))
     film = folder / "performance.mp4"
     progress("page", 0, 0)
+    try:
+        script = page_script()
+    except PageMissing as error:
+        script = None
+        note(str(error))
     sounds = [folder / name for name in _SOUNDS]
     played_mp3, wanted_mp3 = (source("audio/mpeg", sound) for sound in sounds)
+    replay = source(REPLAY_TYPE, folder / _REPLAY)
     light, dark = (source("image/png", folder / name) for name in _PICTURES)
     html = page(
         row,
@@ -94,11 +108,13 @@ def write_report(
         picture=light,
         dark_picture=dark,
         film=source("video/mp4", film) if film.exists() else None,
+        replay=replay,
+        script=script,
     )
     (folder / "report.html").write_text(html, encoding="utf-8")
-    for sound, address in zip(sounds, (played_mp3, wanted_mp3), strict=True):
-        if address != sound.name:  # the page holds it
-            sound.unlink()
+    for name, address in zip((*_SOUNDS, _REPLAY), (played_mp3, wanted_mp3, replay), strict=True):
+        if address != name:  # the page holds it
+            (folder / name).unlink()
     (folder / "report.json").write_text(
         json.dumps(row, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
     )
@@ -124,7 +140,7 @@ def _write_sounds(played: Score, wanted: Score, folder: Path) -> None:
     write_mp3(folder / _SOUNDS[1], encoded(asked.blocks(steps.advance)), asked.sample_rate)
 
 
-def _write_film(performance: Performance, folder: Path, progress: Progress) -> None:
+def _write_film(performance: Performance, poses: Poses, folder: Path, progress: Progress) -> None:
     """Write `performance.mp4`: keys are lit while they sound, phantoms in a colour of their own.
 
     Raises:
@@ -133,24 +149,39 @@ def _write_film(performance: Performance, folder: Path, progress: Progress) -> N
     played = performance.played()
     phantom = np.ones(len(played), bool)
     phantom[match_notes(performance.score, played).played] = False
-    sounding, wrong = np.zeros((2, *performance.pressed.shape), bool)
-    spans = np.stack([np.floor(played.onset * FRAME_RATE), np.ceil(played.offset * FRAME_RATE)])
+    pictures = round(performance.song_seconds * _FILM_FPS)
+    sounding, wrong = np.zeros((2, pictures, KEYS), bool)
+    spans = np.stack([np.floor(played.onset * _FILM_FPS), np.ceil(played.offset * _FILM_FPS)])
     for note, (first, stop) in enumerate(spans.T.astype(int).tolist()):
         sounding[first:stop, played.key[note]] = True
         wrong[first:stop, played.key[note]] |= phantom[note]
 
-    def colours(frame: int) -> NDArray[np.float32]:
-        shown = key_colours(sounding[frame])
-        shown[wrong[frame]] = to_rgb(LIGHT.wrong)
+    def colours(picture: int) -> NDArray[np.float32]:
+        shown = key_colours(sounding[picture])
+        shown[wrong[picture]] = to_rgb(LIGHT.wrong)
         return shown
 
     with WavFile(folder / "performance.wav") as audio:
         write_video(
             folder / "performance.mp4",
-            performance.qpos,
+            _FilmPoses(poses, pictures),
             sounding,
             audio,
             audio.sample_rate,
             colours=colours,
+            fps=_FILM_FPS,
             progress=progress,
         )
+
+
+class _FilmPoses(Sequence[NDArray[np.float64]]):
+    """The joint positions in each picture of a film, found when they are asked for."""
+
+    def __init__(self, poses: Poses, pictures: int) -> None:
+        self._poses, self._pictures = poses, pictures
+
+    def __len__(self) -> int:
+        return self._pictures
+
+    def __getitem__(self, picture: Any) -> Any:
+        return self._poses.at(picture / _FILM_FPS)

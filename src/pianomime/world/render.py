@@ -6,7 +6,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import TracebackType
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pianomime.files import atomic
-from pianomime.keyboard import KEYS
+from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.mp4 import Mp4
 from pianomime.music.sound import SAMPLE_RATE
 from pianomime.music.wav import WavFile
@@ -193,29 +193,31 @@ def render_frame(
 
 def write_video(
     path: str | os.PathLike[str],
-    qpos: NDArray[np.float64],
+    qpos: Sequence[NDArray[np.float64]] | NDArray[np.float64],
     pressed: NDArray[np.bool_],
     audio: NDArray[np.float32] | WavFile | None,
     sample_rate: int = SAMPLE_RATE,
     *,
     colours: Callable[[int], NDArray[np.float32]] | None = None,
     view: View | None = None,
+    fps: int = round(FRAME_RATE),
     progress: Progress = no_progress,
 ) -> None:
-    """Render a performance at 20 pictures a second, with its sound, as MP4 (H.264, AAC).
+    """Render a performance with its sound as MP4 (H.264, AAC).
 
     The video ends with the last frame; sound that rings on is cut there. Frames are encoded as
     they are rendered, so memory does not grow with the song.
 
     Args:
         path: the file; it appears only when complete.
-        qpos: (T, 142) positions: 88 keys, right hand 27, left hand 27 [rad, m].
+        qpos: T times (142,) positions: 88 keys, right hand 27, left hand 27 [rad, m].
         pressed: (T, 88) bool, keys to show as pressed.
         audio: (S, 2) sound, -1..1, or None for a silent video.
         sample_rate: of the sound [Hz].
         colours: gives the colours (88, 3) of the keys in a frame, 0..1; None for those of
             `key_colours(pressed)`.
         view: camera and size.
+        fps: pictures per second, of which T are given.
         progress: called after every frame, in the phase "rendering".
 
     Raises:
@@ -235,7 +237,7 @@ def write_video(
     with (
         Painter(*_oversize(view.size, _VIDEO_OVERSIZE), view.camera) as painter,
         atomic(path) as temporary,
-        Mp4(temporary, view.size, None if audio is None else sample_rate) as film,
+        Mp4(temporary, view.size, None if audio is None else sample_rate, fps=fps) as film,
     ):
         for frame in range(frames):
             shown = key_colours(pressed[frame]) if colours is None else colours(frame)
