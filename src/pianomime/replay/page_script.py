@@ -22,7 +22,6 @@ def page_script() -> str:
     script = files("pianomime.replay") / "page" / _NAME
     if not script.is_file():
         raise PageMissing(
-            "no hands in the page: its script is not built here; with Node.js on this machine, "
-            "`npm ci && npm run build` in web/ builds it"
+            "no hands in the page: its script is not built; from a checkout, `./do page` builds it"
         )
     return script.read_text("utf-8")
