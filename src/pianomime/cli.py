@@ -68,6 +68,12 @@ COMMANDS = {
     "score": Command(
         "pianomime.commands.score", "ScorePlaying", "score anybody's playing of a song"
     ),
+    "gallery": Command(
+        "pianomime.commands.gallery",
+        "Gallery",
+        "make a site of performances, with replays",
+        goes_on=True,
+    ),
     "export": Command(
         "pianomime.commands.export", "Export", "write a performance for a real robot"
     ),
