@@ -1,0 +1,106 @@
+/** Round badges in space, always facing the eye: finger numbers, and crosses at missed keys. */
+
+import {
+  Color,
+  DynamicDrawUsage,
+  InstancedBufferAttribute,
+  InstancedBufferGeometry,
+  Mesh,
+  PlaneGeometry,
+  ShaderMaterial,
+} from "three";
+import type { Texture } from "three";
+
+import { SIGNS } from "./digits";
+import type { Look, Paint } from "./look";
+import { paints } from "./look";
+
+const MOST = 32;
+
+const VERTEX = /* glsl */ `
+  attribute vec4 place;
+  attribute float paint;
+  uniform vec3 paints[4];
+  uniform float radius;
+  varying vec2 corner;
+  varying vec3 tone;
+  varying float sign;
+  void main() {
+    vec4 middle = modelViewMatrix * vec4(place.xyz, 1.0);
+    corner = position.xy;
+    tone = paints[int(paint + 0.5)];
+    sign = place.w;
+    // Halfway between a size in the world and one on the screen, to be read from near and far.
+    float size = radius * (0.4 + 0.6 * -middle.z);
+    middle.xyz += vec3(position.xy * size, 0.0);
+    gl_Position = projectionMatrix * middle;
+  }
+`;
+
+const FRAGMENT = /* glsl */ `
+  uniform sampler2D signs;
+  varying vec2 corner;
+  varying vec3 tone;
+  varying float sign;
+  void main() {
+    float r = length(corner);
+    float edge = fwidth(r);
+    float disc = 1.0 - smoothstep(1.0 - edge, 1.0, r);
+    vec2 inside = corner * 0.62 + 0.5;
+    float ink = texture2D(signs, vec2((sign + inside.x) / ${SIGNS}.0, inside.y)).a;
+    gl_FragColor = vec4(mix(tone, vec3(1.0), ink), disc);
+    #include <colorspace_fragment>
+  }
+`;
+
+export class Badges {
+  readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
+  private readonly place = new InstancedBufferAttribute(new Float32Array(4 * MOST), 4);
+  private readonly paint = new InstancedBufferAttribute(new Float32Array(MOST), 1);
+  private readonly colors = [new Color(), new Color(), new Color(), new Color()];
+
+  constructor(signs: Texture) {
+    const shape = new InstancedBufferGeometry();
+    const quad = new PlaneGeometry(2, 2);
+    shape.index = quad.index;
+    shape.setAttribute("position", quad.getAttribute("position"));
+    shape.setAttribute("place", this.place.setUsage(DynamicDrawUsage));
+    shape.setAttribute("paint", this.paint.setUsage(DynamicDrawUsage));
+    shape.instanceCount = 0;
+    this.mesh = new Mesh(
+      shape,
+      new ShaderMaterial({
+        vertexShader: VERTEX,
+        fragmentShader: FRAGMENT,
+        uniforms: {
+          signs: { value: signs },
+          paints: { value: this.colors },
+          radius: { value: 0.0078 },
+        },
+        transparent: true,
+        depthTest: false,
+        depthWrite: false,
+      }),
+    );
+    this.mesh.frustumCulled = false;
+    this.mesh.renderOrder = 2;
+  }
+
+  setLook(look: Look): void {
+    paints(look).forEach((paint, i) => this.colors[i]!.set(paint));
+  }
+
+  /** Begin a new set of badges. */
+  clear(): void {
+    this.mesh.geometry.instanceCount = 0;
+  }
+
+  add(x: number, y: number, z: number, sign: number, paint: Paint): void {
+    const i = this.mesh.geometry.instanceCount;
+    if (i >= MOST) return;
+    this.place.setXYZW(i, x, y, z, sign);
+    this.paint.setX(i, paint);
+    this.mesh.geometry.instanceCount = i + 1;
+    this.place.needsUpdate = this.paint.needsUpdate = true;
+  }
+}

@@ -1,0 +1,292 @@
+/** The picture in 3D: renderer, lights, camera, and what to leave out where it is drawn slowly. */
+
+import {
+  CanvasTexture,
+  DirectionalLight,
+  HemisphereLight,
+  PCFShadowMap,
+  PerspectiveCamera,
+  Scene,
+  SRGBColorSpace,
+  WebGLRenderer,
+} from "three";
+
+import { Badges } from "./badges";
+import { CameraRig } from "./cameras";
+import { CROSS, signTexture } from "./digits";
+import { FallingNotes } from "./falling_notes";
+import type { SceneContent } from "./format";
+import { KEYS } from "./format";
+import { Kinematics } from "./kinematics";
+import type { Look, Paint } from "./look";
+import { handPaint, heardPaint, isMissed } from "./look";
+import { PianoScene } from "./piano_scene";
+import type { ReplayData } from "./replay_data";
+
+/** What is drawn, from the best to the quickest: pixels for each of the page's, and shadows. */
+const QUALITIES = [
+  { ratio: 2, shadows: true },
+  { ratio: 1, shadows: true },
+  { ratio: 1, shadows: false },
+  { ratio: 0.75, shadows: false },
+  { ratio: 0.5, shadows: false },
+];
+const SOFTWARE = 2;
+/** [ms] Frames that take longer than this, and so many of them, are reason to draw less. */
+const SLOW = 45;
+const PATIENCE = 24;
+/** [s] How long at least a missed note is marked at its key. */
+const MARKED = 0.5;
+/** [m] A finger's number hovers so far above its tip. */
+const ABOVE_TIP = 0.014;
+
+export interface Shown {
+  falling: boolean;
+  numbers: boolean;
+}
+
+/** A renderer, and whether it is the processor that draws. */
+export interface Drawing {
+  renderer: WebGLRenderer;
+  software: boolean;
+}
+
+/** Make a renderer for a canvas; null where there is no WebGL. */
+export function drawingOn(canvas: HTMLCanvasElement): Drawing | null {
+  const software = drawsInSoftware();
+  if (software === null) return null;
+  try {
+    const renderer = new WebGLRenderer({ canvas, antialias: !software });
+    renderer.shadowMap.enabled = true;
+    renderer.shadowMap.type = PCFShadowMap;
+    // Asking the driver about errors makes it wait for each shader in turn.
+    renderer.debug.checkShaderErrors = false;
+    return { renderer, software };
+  } catch {
+    return null;
+  }
+}
+
+export class View3D {
+  readonly rig: CameraRig;
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera();
+  private readonly piano: PianoScene;
+  private readonly falling: FallingNotes;
+  private readonly badges: Badges;
+  private readonly kinematics: Kinematics;
+  private readonly sun = new DirectionalLight(0xffffff, 2.1);
+  private readonly sky = new HemisphereLight(0xffffff, 0x8890a0, 1.25);
+  private readonly fill = new DirectionalLight(0xffffff, 0.5);
+  private readonly signs = signTexture();
+  private readonly pose: Float64Array;
+  private readonly tips: Float64Array;
+  private readonly wrists = new Float64Array(6);
+  private readonly wristBodies: [number, number];
+  private readonly sounding = new Int8Array(KEYS);
+  private quality: number;
+  private slowFrames = 0;
+  private revision = -1;
+
+  constructor(
+    drawing: Drawing,
+    private readonly content: SceneContent,
+    positions: number,
+  ) {
+    this.renderer = drawing.renderer;
+    this.pose = new Float64Array(positions);
+    this.tips = new Float64Array(3 * content.fingertips.length);
+    this.kinematics = new Kinematics(content.bodies);
+    this.piano = new PianoScene(content);
+    this.falling = new FallingNotes(content, this.signs);
+    this.badges = new Badges(this.signs);
+    this.rig = new CameraRig(this.camera, content);
+    this.wristBodies = [wristOf(content, 0), wristOf(content, 1)];
+    this.scene.add(this.piano.group, this.falling.mesh, this.badges.mesh, this.sky);
+    this.addLights();
+    this.quality = drawing.software ? SOFTWARE : 0;
+    this.applyQuality();
+    this.rig.show("player", this.wrists, true);
+  }
+
+  setLook(look: Look): void {
+    this.piano.setLook(look);
+    this.falling.setLook(look);
+    this.badges.setLook(look);
+    this.sky.intensity = look.dark ? 1.05 : 1.5;
+    this.scene.background = backdrop(look);
+  }
+
+  show(name: Parameters<CameraRig["show"]>[0], shown: Shown): void {
+    this.rig.show(name, this.wrists, shown.falling);
+  }
+
+  /** Bring everything to a moment of a performance. */
+  update(data: ReplayData, time: number, shown: Shown): void {
+    if (data.motion) data.motion.sample(time, this.pose);
+    this.kinematics.update(this.pose);
+    this.piano.move(this.kinematics);
+    for (let hand = 0; hand < 2; hand++) {
+      for (let i = 0; i < 3; i++) {
+        this.wrists[3 * hand + i] = this.kinematics.pos[3 * this.wristBodies[hand]! + i]!;
+      }
+    }
+    if (data.revision !== this.revision) {
+      this.revision = data.revision;
+      this.falling.setNotes(data.notes);
+    }
+    this.falling.mesh.visible = shown.falling;
+    this.falling.update(time, shown.numbers);
+    this.lightKeys(data, time);
+    this.addBadges(data, time, shown);
+  }
+
+  /** Move the camera; says whether it moved. */
+  moveCamera(passed: number): boolean {
+    const { canvas } = this.size();
+    return this.rig.update(passed, canvas.clientWidth / canvas.clientHeight, this.wrists);
+  }
+
+  /** Take up the size of the page's canvas; says whether it changed. */
+  resize(): boolean {
+    const { canvas, width, height } = this.size();
+    const ratio = this.renderer.getPixelRatio();
+    if (
+      canvas.width === Math.floor(width * ratio) &&
+      canvas.height === Math.floor(height * ratio)
+    ) {
+      return false;
+    }
+    this.renderer.setSize(width, height, false);
+    return true;
+  }
+
+  draw(): void {
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  /**
+   * Look whether frames come too slowly, and draw less if so.
+   *
+   * @param passed since the frame before, while something moves [ms].
+   */
+  watchSpeed(passed: number): void {
+    // A page that was hidden is not slow.
+    if (passed > 1000) return;
+    this.slowFrames = Math.max(this.slowFrames + (passed > SLOW ? 1 : -1), 0);
+    if (this.slowFrames > PATIENCE && this.quality < QUALITIES.length - 1) {
+      this.quality++;
+      this.slowFrames = 0;
+      this.applyQuality();
+    }
+  }
+
+  dispose(): void {
+    this.scene.traverse((object) => {
+      if ("geometry" in object) (object.geometry as { dispose(): void }).dispose();
+      if ("material" in object) (object.material as { dispose(): void }).dispose();
+    });
+    this.signs.dispose();
+  }
+
+  private size() {
+    const canvas = this.renderer.domElement;
+    return { canvas, width: canvas.clientWidth || 1, height: canvas.clientHeight || 1 };
+  }
+
+  private applyQuality(): void {
+    const { ratio, shadows } = QUALITIES[this.quality]!;
+    this.renderer.setPixelRatio(ratio < 1 ? ratio : Math.min(devicePixelRatio, ratio));
+    this.sun.castShadow = shadows;
+  }
+
+  private addLights(): void {
+    const { pos, target } = this.content.light;
+    this.sun.position.set(...pos);
+    this.sun.target.position.set(...target);
+    const { shadow } = this.sun;
+    shadow.mapSize.set(2048, 2048);
+    Object.assign(shadow.camera, { left: -0.85, right: 0.85, top: 0.85, bottom: -0.85 });
+    shadow.camera.near = 1;
+    shadow.camera.far = 5;
+    shadow.bias = -0.0004;
+    shadow.normalBias = 0.0015;
+    shadow.radius = 3;
+    this.fill.position.set(pos[0], -pos[1], 0.6 * pos[2]);
+    this.scene.add(this.sun, this.sun.target, this.fill);
+  }
+
+  private lightKeys(data: ReplayData, time: number): void {
+    const { heard } = data;
+    this.sounding.fill(-1);
+    data.heardSpans.visit(time, time, (place) => {
+      if (heard.off[place]! > time) {
+        this.sounding[heard.key[place]!] = heardPaint(heard, place);
+      }
+    });
+    this.piano.light(this.sounding);
+  }
+
+  private addBadges(data: ReplayData, time: number, shown: Shown): void {
+    const { badges, kinematics, tips } = this;
+    const { fingertips, keys } = this.content;
+    badges.clear();
+    if (shown.numbers) {
+      for (let i = 0; i < fingertips.length; i++) {
+        const { body, pos, finger, hand } = fingertips[i]!;
+        kinematics.point(body, pos, tips, 3 * i);
+        const z = tips[3 * i + 2]! + ABOVE_TIP;
+        badges.add(tips[3 * i]!, tips[3 * i + 1]!, z, finger, handPaint(hand));
+      }
+    }
+    const { notes } = data;
+    data.noteSpans.visit(time - MARKED, time, (place) => {
+      if (!isMissed(notes, place)) return;
+      if (Math.max(notes.offset[place]!, notes.onset[place]! + MARKED) < time) return;
+      const { top, half } = keys[notes.key[place]!]!;
+      const wrong: Paint = 3;
+      badges.add(top[0] + 0.6 * half[0], top[1], top[2] + 0.006, CROSS, wrong);
+    });
+  }
+}
+
+/** Whether WebGL here is drawn by the processor; null where there is none. */
+function drawsInSoftware(): boolean | null {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  if (!probe) return null;
+  const info = probe.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? String(probe.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+  probe.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+/** The body that carries the fingers of a hand: the last that all of them hang on. */
+function wristOf(content: SceneContent, hand: number): number {
+  const chains = content.fingertips
+    .filter((tip) => tip.hand === hand)
+    .map((tip) => {
+      const chain: number[] = [];
+      for (let body = tip.body; body > 0; body = content.bodies[body]!.parent) chain.push(body);
+      return chain;
+    });
+  return chains[0]?.find((body) => chains.every((chain) => chain.includes(body))) ?? 0;
+}
+
+/** A soft light behind everything, so that a black piano stands out from a dark page. */
+function backdrop(look: Look): CanvasTexture {
+  const canvas = document.createElement("canvas");
+  canvas.width = 256;
+  canvas.height = 144;
+  const draw = canvas.getContext("2d")!;
+  draw.fillStyle = look.page;
+  draw.fillRect(0, 0, canvas.width, canvas.height);
+  const light = draw.createRadialGradient(128, 62, 10, 128, 72, 170);
+  light.addColorStop(0, look.dark ? "#39424f" : "#ffffff");
+  light.addColorStop(1, look.page);
+  draw.fillStyle = light;
+  draw.fillRect(0, 0, canvas.width, canvas.height);
+  const texture = new CanvasTexture(canvas);
+  texture.colorSpace = SRGBColorSpace;
+  return texture;
+}
