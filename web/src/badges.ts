@@ -34,6 +34,9 @@ const VERTEX = /* glsl */ `
     float size = radius * (0.4 + 0.6 * -middle.z);
     middle.xyz += vec3(position.xy * size, 0.0);
     gl_Position = projectionMatrix * middle;
+    // A badge is hidden by what is in front of its fingertip, not by the fingertip.
+    vec4 nearer = projectionMatrix * vec4(middle.xy, middle.z + 0.06, 1.0);
+    gl_Position.z = nearer.z / nearer.w * gl_Position.w;
   }
 `;
 
@@ -78,7 +81,6 @@ export class Badges {
           radius: { value: 0.0078 },
         },
         transparent: true,
-        depthTest: false,
         depthWrite: false,
       }),
     );

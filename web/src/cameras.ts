@@ -3,7 +3,7 @@
 import type { PerspectiveCamera } from "three";
 import { Vector3 } from "three";
 
-import type { SceneContent, Triple } from "./format";
+import type { SceneContent, Triple, View } from "./format";
 import { HEIGHT } from "./falling_notes";
 
 export const VIEWS = ["player", "audience", "top", "keys", "left", "right"] as const;
@@ -11,6 +11,10 @@ export type ViewName = (typeof VIEWS)[number];
 
 /** The presets are composed for pictures of this shape; in narrower ones the eye sees wider. */
 const ASPECT = 16 / 9;
+const PLAYER: View = { pos: [1.22, 0, 1.5], target: [0.075, 0, 0], fovy: 17.5 };
+const TOP: View = { pos: [0.1, 0, 2.2], target: [0.0999, 0, 0], fovy: 16 };
+/** The keyboard takes up this part of a picture's width at most. */
+const FILLED = 0.94;
 const NEAREST = 0.06;
 const FARTHEST = 6;
 /** [1/s] How fast the eye goes where it is meant to be. */
@@ -156,19 +160,27 @@ export class CameraRig {
     camera.updateMatrixWorld();
   }
 
-  private compose(name: ViewName, wrists: Float64Array) {
+  /** A film's camera, which may leave out keys that nobody plays, made to see all of them. */
+  private fitted(view: View): View {
+    const half = Math.max(...this.scene.keys.map(({ top, half }) => Math.abs(top[1]) + half[1]));
+    const away = Math.hypot(...view.pos.map((x, i) => x - view.target[i]!));
+    const needed = (Math.atan(half / FILLED / ASPECT / away) * 360) / Math.PI;
+    return { ...view, fovy: Math.max(view.fovy, needed) };
+  }
+
+  private compose(name: ViewName, wrists: Float64Array): View {
     const lift = this.withNotes ? HEIGHT : 0;
     const { cameras } = this.scene;
     const at = (x: number, y: number, z: number): Triple => [x, y, z];
     switch (name) {
       case "player":
         return lift > 0
-          ? { pos: at(1.75, 0, 1.02), target: at(0.02, 0, 0.125), fovy: 24 }
-          : (cameras["player"] ?? { pos: at(1.22, 0, 1.5), target: at(0.075, 0, 0), fovy: 17.5 });
+          ? { pos: at(1.75, 0, 1.06), target: at(0.02, 0, 0.165), fovy: 23 }
+          : this.fitted(cameras["player"] ?? PLAYER);
       case "audience":
-        return { pos: at(1.15, 1.15, 0.62), target: at(0.04, 0.05, 0.06 + lift / 4), fovy: 34 };
+        return { pos: at(1.15, 1.15, 0.62), target: at(0.04, 0.05, 0.06 + lift / 4), fovy: 30 };
       case "top":
-        return cameras["top"] ?? { pos: at(0.1, 0, 2.2), target: at(0.0999, 0, 0), fovy: 16 };
+        return this.fitted(cameras["top"] ?? TOP);
       case "keys":
         return { pos: at(0.16, -0.98, 0.2), target: at(0.03, 0.1, 0.05), fovy: 32 };
       case "left":
@@ -177,8 +189,8 @@ export class CameraRig {
         const side = name === "left" ? -1 : 1;
         const [x, y, z] = [wrists[i]!, wrists[i + 1]!, wrists[i + 2]!];
         return {
-          pos: at(x + 0.06, y - side * 0.34, z + 0.24),
-          target: at(x - 0.1, y, z - 0.03),
+          pos: at(x + 0.02, y + side * 0.36, z + 0.2),
+          target: at(x - 0.09, y, z - 0.03),
           fovy: 34,
         };
       }

@@ -21,6 +21,8 @@ export const HEIGHT = 0.44;
 const AHEAD = 3;
 /** [m] How far the plane stands behind the keys. */
 const BEHIND = 0.006;
+/** [m] How far its lower edge is above the keys, so that nothing behind them hides it. */
+const ABOVE = 0.008;
 
 const VERTEX = /* glsl */ `
   attribute vec4 span;
@@ -86,7 +88,6 @@ const FRAGMENT = /* glsl */ `
       float square = size.x;
       vec2 at = inside / square;
       if (at.y < 1.0 && size.y > 0.6 * square) {
-        alpha = alpha;
         float ink = texture2D(signs, vec2((finger + at.x) / ${SIGNS}.0, at.y)).a;
         color = mix(color, vec3(1.0), ink);
         alpha = max(alpha, ink * step(out_, 0.0));
@@ -115,7 +116,7 @@ export class FallingNotes {
     }
     this.uniforms = {
       time: { value: 0 },
-      origin: { value: [back - BEHIND, 0, top] },
+      origin: { value: [back - BEHIND, 0, top + ABOVE] },
       paints: { value: this.colors },
       wrong: { value: this.colors[3] },
       signs: { value: signs },

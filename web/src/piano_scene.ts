@@ -1,6 +1,7 @@
 /** The piano and the hands as three.js objects, few of them, moved by forward kinematics. */
 
 import {
+  CanvasTexture,
   Color,
   DynamicDrawUsage,
   Group,
@@ -24,7 +25,10 @@ import { joined, keyShape, materialColor, placeOf } from "./shapes";
 
 const ONE = new Vector3(1, 1, 1);
 /** How far a key that sounds takes on the colour of its hand. */
-const LIT = 0.82;
+const LIT = 0.9;
+
+/** [m] Half sizes of the darkness around the piano's foot, which shows where the floor is. */
+const SOFT_SHADOW: readonly [number, number] = [0.42, 0.95];
 
 interface MovingBody {
   mesh: Mesh;
@@ -193,8 +197,15 @@ export class PianoScene {
   }
 
   private addFloor(): void {
+    const soft = new Mesh(
+      new PlaneGeometry(2 * SOFT_SHADOW[0], 2 * SOFT_SHADOW[1]),
+      new MeshBasicMaterial({ map: softShadow(), transparent: true, depthWrite: false }),
+    );
+    soft.position.set(-0.03, 0, this.floor + 0.001);
+    this.group.add(soft);
     const mesh = new Mesh(new PlaneGeometry(6, 6), this.floorShadow);
-    mesh.position.z = this.floor;
+    mesh.position.z = this.floor + 0.002;
+    mesh.material.depthWrite = false;
     mesh.receiveShadow = true;
     this.group.add(mesh);
   }
@@ -243,4 +254,21 @@ function phong(geom: Geom, scene: SceneContent, color?: number): MeshPhongMateri
     specular: new Color(specular, specular, specular),
     shininess: 128 * (material?.shininess ?? 0.5) * 0.6,
   });
+}
+
+/** A dark rectangle that fades towards its rim. */
+function softShadow(): CanvasTexture {
+  const canvas = document.createElement("canvas");
+  [canvas.width, canvas.height] = [128, 256];
+  const draw = canvas.getContext("2d")!;
+  const image = draw.createImageData(canvas.width, canvas.height);
+  const side = (at: number, size: number): number => Math.sin((Math.PI * (at + 0.5)) / size);
+  for (let y = 0; y < canvas.height; y++) {
+    for (let x = 0; x < canvas.width; x++) {
+      const dark = Math.min(side(x, canvas.width) * 1.6, 1) * Math.min(side(y, canvas.height) * 3, 1);
+      image.data[4 * (y * canvas.width + x) + 3] = 110 * dark * dark;
+    }
+  }
+  draw.putImageData(image, 0, 0);
+  return new CanvasTexture(canvas);
 }

@@ -145,6 +145,7 @@ export class ReplayElement extends HTMLElement implements Showing {
   set currentTime(time: number) {
     this.clock.seek(time);
     this.roll.follow();
+    this.isUntouched = false;
   }
 
   /** Length in seconds; that of the song while it is still being played. */

@@ -225,7 +225,7 @@ export class Roll {
   }
 
   private scroll(time: number, duration: number): void {
-    this.span = Math.min(this.span, Math.max(duration, SHORTEST) * 1.02);
+    if (duration > 0) this.span = Math.min(this.span, Math.max(duration, SHORTEST) * 1.02);
     const latest = Math.max(duration * 1.02 - this.span, 0);
     this.from = Math.min(Math.max(time - HEAD_AT * this.span, 0), latest);
     if (time > this.from + this.span || time < this.from) this.from = time;

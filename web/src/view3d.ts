@@ -76,9 +76,9 @@ export class View3D {
   private readonly falling: FallingNotes;
   private readonly badges: Badges;
   private readonly kinematics: Kinematics;
-  private readonly sun = new DirectionalLight(0xffffff, 2.1);
+  private readonly sun = new DirectionalLight(0xffffff, 1.75);
   private readonly sky = new HemisphereLight(0xffffff, 0x8890a0, 1.25);
-  private readonly fill = new DirectionalLight(0xffffff, 0.5);
+  private readonly fill = new DirectionalLight(0xffffff, 0.35);
   private readonly signs = signTexture();
   private readonly pose: Float64Array;
   private readonly tips: Float64Array;
@@ -114,7 +114,7 @@ export class View3D {
     this.piano.setLook(look);
     this.falling.setLook(look);
     this.badges.setLook(look);
-    this.sky.intensity = look.dark ? 1.05 : 1.5;
+    this.sky.intensity = look.dark ? 0.95 : 1.35;
     this.scene.background = backdrop(look);
   }
 
