@@ -9,6 +9,8 @@ export interface Look {
   faint: string;
   line: string;
   wrong: string;
+  /** Of the light behind the picture, which fades into that of the page. */
+  glow: string;
   /** Of the left hand, the right hand, and no hand. */
   hands: [string, string, string];
   dark: boolean;
@@ -29,6 +31,7 @@ export function lookOf(host: Element): Look {
     faint: colour("faint"),
     line: colour("line"),
     wrong: colour("wrong"),
+    glow: colour("glow"),
     hands: [colour("left"), colour("right"), colour("nobody")],
     dark: colour("dark") === "1",
   };

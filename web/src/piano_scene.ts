@@ -1,17 +1,17 @@
 /** The piano and the hands as three.js objects, few of them, moved by forward kinematics. */
 
 import {
-  CanvasTexture,
   Color,
   DynamicDrawUsage,
   Group,
   InstancedMesh,
   Matrix4,
   Mesh,
-  MeshBasicMaterial,
+  MeshLambertMaterial,
   MeshPhongMaterial,
   PlaneGeometry,
   Quaternion,
+  ShaderMaterial,
   ShadowMaterial,
   Vector3,
 } from "three";
@@ -29,6 +29,22 @@ const LIT = 0.9;
 
 /** [m] Half sizes of the darkness around the piano's foot, which shows where the floor is. */
 const SOFT_SHADOW: readonly [number, number] = [0.42, 0.95];
+
+const SOFT_VERTEX = /* glsl */ `
+  varying vec2 corner;
+  void main() {
+    corner = 2.0 * uv - 1.0;
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  }
+`;
+const SOFT_FRAGMENT = /* glsl */ `
+  varying vec2 corner;
+  void main() {
+    vec2 near = clamp((1.0 - abs(corner)) * vec2(1.3, 2.2), 0.0, 1.0);
+    near *= near * (3.0 - 2.0 * near);
+    gl_FragColor = vec4(0.0, 0.0, 0.0, 0.45 * near.x * near.y);
+  }
+`;
 
 interface MovingBody {
   mesh: Mesh;
@@ -61,31 +77,45 @@ export class PianoScene {
   private readonly color = new Color();
   private readonly lastPose: Float64Array;
 
-  constructor(scene: SceneContent) {
+  /**
+   * @param scene what there is to be seen.
+   * @param plain whether to leave out what shines, which takes a processor long to draw.
+   */
+  constructor(
+    scene: SceneContent,
+    private readonly plain: boolean,
+  ) {
     const isStatic = staticBodies(scene);
     this.lastPose = new Float64Array(7 * scene.bodies.length).fill(NaN);
-    const plain = scene.geoms.filter((geom) => geom.key < 0 && geom.lamp < 0);
-    const ground = plain.find((geom) => geom.type === "plane");
+    const others = scene.geoms.filter((geom) => geom.key < 0 && geom.lamp < 0);
+    const ground = others.find((geom) => geom.type === "plane");
     this.floor = ground ? ground.pos[2] : -0.05;
     this.addStatic(
-      plain.filter((geom) => isStatic[geom.body] && geom !== ground),
+      others.filter((geom) => isStatic[geom.body] && geom !== ground),
       scene,
     );
     this.addBodies(
-      plain.filter((geom) => !isStatic[geom.body]),
+      others.filter((geom) => !isStatic[geom.body]),
       scene,
     );
     const white = scene.geoms.filter((geom) => geom.key >= 0 && !scene.keys[geom.key]!.black);
     const black = scene.geoms.filter((geom) => geom.key >= 0 && scene.keys[geom.key]!.black);
     for (const geoms of [white, black]) {
       if (geoms.length > 0) {
-        this.parts.push(this.addKeys(geoms, scene, phong(geoms[0]!, scene, 0xffffff), true));
+        this.parts.push(this.addKeys(geoms, scene, this.material(geoms[0]!, scene, false), true));
       }
     }
     const lamps = scene.geoms.filter((geom) => geom.lamp >= 0);
     this.lamps =
-      lamps.length > 0 ? this.addKeys(lamps, scene, new MeshBasicMaterial(), false) : null;
+      lamps.length > 0
+        ? this.addKeys(lamps, scene, this.material(lamps[0]!, scene, false), false)
+        : null;
     this.addFloor();
+  }
+
+  /** Show shadows, where they are drawn at all. */
+  setShadows(shadows: boolean): void {
+    this.floorShadow.visible = shadows;
   }
 
   setLook(look: Look): void {
@@ -142,7 +172,7 @@ export class PianoScene {
       const those = geoms.filter((geom) => geom.material === material);
       // The world's own frame is that of all bodies that never move: the format's piano has no
       // place of its own.
-      const mesh = new Mesh(joined(those, scene), phong(those[0]!, scene));
+      const mesh = new Mesh(joined(those, scene), this.material(those[0]!, scene, true));
       mesh.castShadow = mesh.receiveShadow = true;
       this.group.add(mesh);
     }
@@ -152,7 +182,7 @@ export class PianoScene {
     const shells = geoms.find((geom) => scene.materials[geom.material]?.name === "shell");
     const first = shells ?? geoms[0];
     if (!first) return;
-    const material = phong(first, scene);
+    const material = this.material(first, scene, true);
     for (const body of new Set(geoms.map((geom) => geom.body))) {
       const shape = joined(
         geoms.filter((geom) => geom.body === body),
@@ -169,7 +199,7 @@ export class PianoScene {
   private addKeys(
     geoms: Geom[],
     scene: SceneContent,
-    material: MeshPhongMaterial | MeshBasicMaterial,
+    material: MeshPhongMaterial | MeshLambertMaterial,
     shadows: boolean,
   ): KeyParts {
     const size = geoms[0]!.size;
@@ -199,7 +229,12 @@ export class PianoScene {
   private addFloor(): void {
     const soft = new Mesh(
       new PlaneGeometry(2 * SOFT_SHADOW[0], 2 * SOFT_SHADOW[1]),
-      new MeshBasicMaterial({ map: softShadow(), transparent: true, depthWrite: false }),
+      new ShaderMaterial({
+        vertexShader: SOFT_VERTEX,
+        fragmentShader: SOFT_FRAGMENT,
+        transparent: true,
+        depthWrite: false,
+      }),
     );
     soft.position.set(-0.03, 0, this.floor + 0.001);
     this.group.add(soft);
@@ -208,6 +243,22 @@ export class PianoScene {
     mesh.material.depthWrite = false;
     mesh.receiveShadow = true;
     this.group.add(mesh);
+  }
+
+  /** The look of a geom's material; its color is that of vertices or of instances. */
+  private material(
+    geom: Geom,
+    scene: SceneContent,
+    vertexColors: boolean,
+  ): MeshPhongMaterial | MeshLambertMaterial {
+    if (this.plain) return new MeshLambertMaterial({ vertexColors });
+    const material = scene.materials[geom.material];
+    const specular = 0.35 * (material?.specular ?? 0);
+    return new MeshPhongMaterial({
+      vertexColors,
+      specular: new Color(specular, specular, specular),
+      shininess: 77 * (material?.shininess ?? 0.5),
+    });
   }
 
   private moved(kinematics: Kinematics, body: number): boolean {
@@ -243,32 +294,4 @@ function staticBodies(scene: SceneContent): boolean[] {
     still.push(i === 0 || (still[body.parent]! && body.joints.length === 0 && !placed));
   });
   return still;
-}
-
-function phong(geom: Geom, scene: SceneContent, color?: number): MeshPhongMaterial {
-  const material = scene.materials[geom.material];
-  const specular = 0.35 * (material?.specular ?? 0);
-  return new MeshPhongMaterial({
-    color: color ?? 0xffffff,
-    vertexColors: color === undefined,
-    specular: new Color(specular, specular, specular),
-    shininess: 128 * (material?.shininess ?? 0.5) * 0.6,
-  });
-}
-
-/** A dark rectangle that fades towards its rim. */
-function softShadow(): CanvasTexture {
-  const canvas = document.createElement("canvas");
-  [canvas.width, canvas.height] = [128, 256];
-  const draw = canvas.getContext("2d")!;
-  const image = draw.createImageData(canvas.width, canvas.height);
-  const side = (at: number, size: number): number => Math.sin((Math.PI * (at + 0.5)) / size);
-  for (let y = 0; y < canvas.height; y++) {
-    for (let x = 0; x < canvas.width; x++) {
-      const dark = Math.min(side(x, canvas.width) * 1.6, 1) * Math.min(side(y, canvas.height) * 3, 1);
-      image.data[4 * (y * canvas.width + x) + 3] = 110 * dark * dark;
-    }
-  }
-  draw.putImageData(image, 0, 0);
-  return new CanvasTexture(canvas);
 }

@@ -360,6 +360,9 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.view = new View3D(this.drawing, data.scene, data.motion.positions);
       this.view.rig.still = true;
       this.view.setLook(lookOf(this));
+      void this.view.prepare().then(() => {
+        this.isStale = true;
+      });
     }
     if (data.failure !== null) {
       this.overlay.setMessage(data.failure);
@@ -437,12 +440,12 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.costs[this.frames % COSTS] = performance.now() - start;
       this.frames++;
     }
-    if (view && draws) {
+    if (view?.isPrepared && draws) {
       view.draw();
       view.watchSpeed(passed);
       view.rig.still = false;
     }
-    if (this.settle && (data.motion?.poses ?? 0) > 0 && (view ?? this.fallback)) {
+    if (this.settle && (data.motion?.poses ?? 0) > 0 && (view?.isPrepared ?? this.fallback)) {
       this.settle.resolve();
       this.settle = null;
     }
@@ -460,7 +463,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     if (this.faultsRevision !== data.revision) this.findFaults();
     if (clock.playing) this.isUntouched = false;
     if (clock.blocked) this.isUntouched = true;
-    const pictured = this.view !== null;
+    const pictured = this.view?.isPrepared ?? false;
     const { playing, waiting, duration, rate } = clock;
     this.overlay.update(data, { playing, waiting, untouched: this.isUntouched, pictured });
     this.bar.update({

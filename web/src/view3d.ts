@@ -1,13 +1,11 @@
 /** The picture in 3D: renderer, lights, camera, and what to leave out where it is drawn slowly. */
 
 import {
-  CanvasTexture,
   DirectionalLight,
   HemisphereLight,
   PCFShadowMap,
   PerspectiveCamera,
   Scene,
-  SRGBColorSpace,
   WebGLRenderer,
 } from "three";
 
@@ -32,9 +30,9 @@ const QUALITIES = [
   { ratio: 0.5, shadows: false },
 ];
 const SOFTWARE = 2;
-/** [ms] Frames that take longer than this, and so many of them, are reason to draw less. */
+/** [ms] Frames that take longer than this, for so long in all, are reason to draw less. */
 const SLOW = 45;
-const PATIENCE = 24;
+const PATIENCE = 900;
 /** [s] How long at least a missed note is marked at its key. */
 const MARKED = 0.5;
 /** [m] A finger's number hovers so far above its tip. */
@@ -56,7 +54,7 @@ export function drawingOn(canvas: HTMLCanvasElement): Drawing | null {
   const software = drawsInSoftware();
   if (software === null) return null;
   try {
-    const renderer = new WebGLRenderer({ canvas, antialias: !software });
+    const renderer = new WebGLRenderer({ canvas, antialias: !software, alpha: true });
     renderer.shadowMap.enabled = true;
     renderer.shadowMap.type = PCFShadowMap;
     // Asking the driver about errors makes it wait for each shader in turn.
@@ -69,7 +67,10 @@ export function drawingOn(canvas: HTMLCanvasElement): Drawing | null {
 
 export class View3D {
   readonly rig: CameraRig;
+  /** Whether all shaders are made, so that drawing keeps nobody waiting. */
+  isPrepared = false;
   private readonly renderer: WebGLRenderer;
+  private readonly software: boolean;
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera();
   private readonly piano: PianoScene;
@@ -86,7 +87,7 @@ export class View3D {
   private readonly wristBodies: [number, number];
   private readonly sounding = new Int8Array(KEYS);
   private quality: number;
-  private slowFrames = 0;
+  private slowFor = 0;
   private revision = -1;
 
   constructor(
@@ -95,19 +96,27 @@ export class View3D {
     positions: number,
   ) {
     this.renderer = drawing.renderer;
+    this.software = drawing.software;
     this.pose = new Float64Array(positions);
     this.tips = new Float64Array(3 * content.fingertips.length);
     this.kinematics = new Kinematics(content.bodies);
-    this.piano = new PianoScene(content);
+    this.piano = new PianoScene(content, drawing.software);
     this.falling = new FallingNotes(content, this.signs);
     this.badges = new Badges(this.signs);
     this.rig = new CameraRig(this.camera, content);
     this.wristBodies = [wristOf(content, 0), wristOf(content, 1)];
     this.scene.add(this.piano.group, this.falling.mesh, this.badges.mesh, this.sky);
     this.addLights();
-    this.quality = drawing.software ? SOFTWARE : 0;
+    this.quality = this.software ? SOFTWARE : 0;
     this.applyQuality();
     this.rig.show("player", this.wrists, true);
+  }
+
+  /** Make the shaders, while the page stays usable. */
+  async prepare(): Promise<void> {
+    this.moveCamera(0);
+    await this.renderer.compileAsync(this.scene, this.camera);
+    this.isPrepared = true;
   }
 
   setLook(look: Look): void {
@@ -115,7 +124,6 @@ export class View3D {
     this.falling.setLook(look);
     this.badges.setLook(look);
     this.sky.intensity = look.dark ? 0.95 : 1.35;
-    this.scene.background = backdrop(look);
   }
 
   show(name: Parameters<CameraRig["show"]>[0], shown: Shown): void {
@@ -174,10 +182,10 @@ export class View3D {
   watchSpeed(passed: number): void {
     // A page that was hidden is not slow.
     if (passed > 1000) return;
-    this.slowFrames = Math.max(this.slowFrames + (passed > SLOW ? 1 : -1), 0);
-    if (this.slowFrames > PATIENCE && this.quality < QUALITIES.length - 1) {
+    this.slowFor = passed > SLOW ? this.slowFor + passed : Math.max(this.slowFor - passed, 0);
+    if (this.slowFor > PATIENCE && this.quality < QUALITIES.length - 1) {
       this.quality++;
-      this.slowFrames = 0;
+      this.slowFor = 0;
       this.applyQuality();
     }
   }
@@ -199,6 +207,7 @@ export class View3D {
     const { ratio, shadows } = QUALITIES[this.quality]!;
     this.renderer.setPixelRatio(ratio < 1 ? ratio : Math.min(devicePixelRatio, ratio));
     this.sun.castShadow = shadows;
+    this.piano.setShadows(shadows);
   }
 
   private addLights(): void {
@@ -214,7 +223,8 @@ export class View3D {
     shadow.normalBias = 0.0015;
     shadow.radius = 3;
     this.fill.position.set(pos[0], -pos[1], 0.6 * pos[2]);
-    this.scene.add(this.sun, this.sun.target, this.fill);
+    this.scene.add(this.sun, this.sun.target);
+    if (!this.software) this.scene.add(this.fill);
   }
 
   private lightKeys(data: ReplayData, time: number): void {
@@ -271,22 +281,4 @@ function wristOf(content: SceneContent, hand: number): number {
       return chain;
     });
   return chains[0]?.find((body) => chains.every((chain) => chain.includes(body))) ?? 0;
-}
-
-/** A soft light behind everything, so that a black piano stands out from a dark page. */
-function backdrop(look: Look): CanvasTexture {
-  const canvas = document.createElement("canvas");
-  canvas.width = 256;
-  canvas.height = 144;
-  const draw = canvas.getContext("2d")!;
-  draw.fillStyle = look.page;
-  draw.fillRect(0, 0, canvas.width, canvas.height);
-  const light = draw.createRadialGradient(128, 62, 10, 128, 72, 170);
-  light.addColorStop(0, look.dark ? "#39424f" : "#ffffff");
-  light.addColorStop(1, look.page);
-  draw.fillStyle = light;
-  draw.fillRect(0, 0, canvas.width, canvas.height);
-  const texture = new CanvasTexture(canvas);
-  texture.colorSpace = SRGBColorSpace;
-  return texture;
 }
