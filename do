@@ -194,8 +194,10 @@ def main():
     elif command == "docs" and rest in ([], ["serve"]):
         set_up("docs")
         os.chdir(ROOT)
-        if subprocess.call([PYTHON, os.path.join("docs", "make_reference.py")]) != 0:
-            stop("the reference could not be made; the lines above say why")
+        build_page()
+        for what in ("reference", "replays"):
+            if subprocess.call([PYTHON, os.path.join("docs", "make_%s.py" % what)]) != 0:
+                stop("the %s could not be made; the lines above say why" % what)
         zensical = [PYTHON, "-m", "zensical"]
         if rest:
             run(zensical + ["serve"])

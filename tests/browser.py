@@ -22,20 +22,37 @@ _OPTIONS = (
 )
 
 
-@contextmanager
-def browser(*options: str) -> Iterator[Any]:
-    """A headless Chromium, as Playwright drives it; skips the test where there is none.
+class Browsers:
+    """Starts browsers, which are all closed in the end."""
 
-    Args:
-        options: more of its command line.
+    def __init__(self, driver: Any, path: str) -> None:
+        self._driver, self._path = driver, path
+
+    @contextmanager
+    def chromium(self, *options: str) -> Iterator[Any]:
+        """A headless Chromium, as Playwright drives it.
+
+        Args:
+            options: more of its command line.
+        """
+        launched = self._driver.chromium.launch(
+            executable_path=self._path, args=[*_OPTIONS, *options]
+        )
+        try:
+            yield launched
+        finally:
+            launched.close()
+
+
+@contextmanager
+def browsers() -> Iterator[Browsers]:
+    """What starts browsers; skips the test where there is none.
+
+    While it is open, nothing else in this thread can use asyncio.
     """
     found = next(filter(None, map(shutil.which, _NAMES)), None)
     if found is None:
         pytest.skip("this machine has no Chromium")
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as driver:
-        launched = driver.chromium.launch(executable_path=found, args=[*_OPTIONS, *options])
-        try:
-            yield launched
-        finally:
-            launched.close()
+        yield Browsers(driver, found)

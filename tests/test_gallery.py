@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import made_up
-from browser import browser
+from browser import browsers
 from pianomime.cli import main
 from pianomime.errors import InputError
 from pianomime.report.gallery import performances_of, write_gallery
@@ -99,7 +99,7 @@ def test_bad_input_is_one_line(
 
 
 def test_cards_are_sorted_and_found(site: Path) -> None:
-    with browser() as chromium:
+    with browsers() as started, started.chromium() as chromium:
         page = chromium.new_page()
         errors: list[str] = []
         page.on("pageerror", lambda error: errors.append(str(error)))
