@@ -83,6 +83,15 @@ export class ReplayElement extends HTMLElement implements Showing {
     this.isVisible = entries.at(-1)?.isIntersecting ?? true;
   });
 
+  // Asked for within a frame, a size would make the browser lay out the page anew.
+  private readonly measure = new ResizeObserver(([entry]) => {
+    if (!entry) return;
+    this.width = Math.max(Math.round(entry.contentRect.width), 1);
+    this.height = Math.max(Math.round(entry.contentRect.height), 1);
+  });
+  private width = 16;
+  private height = 9;
+
   constructor() {
     super();
     const actions = this.actions();
@@ -253,6 +262,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     this.darkness.addEventListener("change", this.takeLook);
     addEventListener("keydown", this.onKey);
     this.watcher.observe(this);
+    this.measure.observe(this.viewBox);
     this.takeLook();
     this.load();
     this.takeSound();
@@ -287,6 +297,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     this.darkness.removeEventListener("change", this.takeLook);
     removeEventListener("keydown", this.onKey);
     this.watcher.disconnect();
+    this.measure.disconnect();
     this.view?.dispose();
     this.view = null;
     if (this.drawing) {
@@ -428,8 +439,9 @@ export class ReplayElement extends HTMLElement implements Showing {
     if (view) {
       if (changed) view.update(data, time, this.shown);
       if (this.calm.matches) view.rig.still = true;
+      const resized = view.resize(this.width, this.height);
       const moved = view.moveCamera(passed / 1000);
-      draws = view.resize() || moved || changed;
+      draws = resized || moved || changed;
       this.overlay.setView(view.rig.view);
     }
     this.isStale = false;

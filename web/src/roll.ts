@@ -55,6 +55,10 @@ export class Roll {
     this.root = make("div", { class: "roll" }, this.canvas, this.tip);
     this.draw2d = this.canvas.getContext("2d")!;
     this.listen();
+    new ResizeObserver(([entry]) => {
+      this.width = entry!.contentRect.width || 1;
+      this.height = entry!.contentRect.height || 1;
+    }).observe(this.canvas);
   }
 
   setLook(look: Look): void {
@@ -97,8 +101,6 @@ export class Roll {
     const data = this.data();
     if (this.revision !== data.revision) this.fitKeys(data);
     const { playing, loop, duration } = this.clock();
-    this.width = this.canvas.clientWidth || 1;
-    this.height = this.canvas.clientHeight || 1;
     if (this.follows || (playing && time > this.from + this.span)) this.scroll(time, duration);
     if (performance.now() > this.tipUntil) this.tell(null);
     const known = data.ended ? duration : Math.max(data.motion?.end ?? 0, 0);

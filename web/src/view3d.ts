@@ -88,6 +88,9 @@ export class View3D {
   private readonly sounding = new Int8Array(KEYS);
   private quality: number;
   private slowFor = 0;
+  private width = 16;
+  private height = 9;
+  private ratio = 0;
   private revision = -1;
 
   constructor(
@@ -152,20 +155,14 @@ export class View3D {
 
   /** Move the camera; says whether it moved. */
   moveCamera(passed: number): boolean {
-    const { canvas } = this.size();
-    return this.rig.update(passed, canvas.clientWidth / canvas.clientHeight, this.wrists);
+    return this.rig.update(passed, this.width / this.height, this.wrists);
   }
 
-  /** Take up the size of the page's canvas; says whether it changed. */
-  resize(): boolean {
-    const { canvas, width, height } = this.size();
+  /** Take up a size of the page's canvas [px]; says whether that changes anything. */
+  resize(width: number, height: number): boolean {
     const ratio = this.renderer.getPixelRatio();
-    if (
-      canvas.width === Math.floor(width * ratio) &&
-      canvas.height === Math.floor(height * ratio)
-    ) {
-      return false;
-    }
+    if (width === this.width && height === this.height && ratio === this.ratio) return false;
+    [this.width, this.height, this.ratio] = [width, height, ratio];
     this.renderer.setSize(width, height, false);
     return true;
   }
@@ -196,11 +193,6 @@ export class View3D {
       if ("material" in object) (object.material as { dispose(): void }).dispose();
     });
     this.signs.dispose();
-  }
-
-  private size() {
-    const canvas = this.renderer.domElement;
-    return { canvas, width: canvas.clientWidth || 1, height: canvas.clientHeight || 1 };
   }
 
   private applyQuality(): void {
