@@ -1,6 +1,5 @@
 import { beforeEach, describe, expect, it } from "vitest";
 
-import type { Showing, Sound } from "../src/clock";
 import { Clock } from "../src/clock";
 
 /** A sound that plays when the test lets time pass, and tells its time in coarse steps. */
