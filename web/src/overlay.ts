@@ -91,6 +91,7 @@ export class Overlay {
     if (head) setText(this.caption, `${head.title} — ${head.player}, effort ${head.effort}`);
     const begun = (motion?.poses ?? 0) > 0;
     show(this.cameras, state.pictured);
+    show(this.caption, state.pictured);
     show(this.start, begun && state.untouched && !state.playing);
     show(this.planning, !begun && plan !== null && !data.ended);
     show(

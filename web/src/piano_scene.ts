@@ -38,11 +38,12 @@ const SOFT_VERTEX = /* glsl */ `
   }
 `;
 const SOFT_FRAGMENT = /* glsl */ `
+  uniform float depth;
   varying vec2 corner;
   void main() {
     vec2 near = clamp((1.0 - abs(corner)) * vec2(1.3, 2.2), 0.0, 1.0);
     near *= near * (3.0 - 2.0 * near);
-    gl_FragColor = vec4(0.0, 0.0, 0.0, 0.45 * near.x * near.y);
+    gl_FragColor = vec4(0.0, 0.0, 0.0, depth * near.x * near.y);
   }
 `;
 
@@ -68,6 +69,7 @@ export class PianoScene {
   private readonly moving: MovingBody[] = [];
   private readonly parts: KeyParts[] = [];
   private readonly lamps: KeyParts | null;
+  private readonly softness = { depth: { value: 0 } };
   private readonly floorShadow = new ShadowMaterial();
   private readonly lit = new Int8Array(KEYS).fill(-1);
   private readonly paints = [new Color(), new Color(), new Color(), new Color()];
@@ -121,6 +123,7 @@ export class PianoScene {
   setLook(look: Look): void {
     paints(look).forEach((paint, i) => this.paints[i]!.set(paint));
     this.floorShadow.opacity = look.dark ? 0.45 : 0.22;
+    this.softness.depth.value = look.dark ? 0.5 : 0.26;
     this.lit.fill(-1);
     for (const part of [...this.parts, ...(this.lamps ? [this.lamps] : [])]) {
       for (let i = 0; i < part.keys.length; i++) part.mesh.setColorAt(i, part.colors[i]!);
@@ -232,6 +235,7 @@ export class PianoScene {
       new ShaderMaterial({
         vertexShader: SOFT_VERTEX,
         fragmentShader: SOFT_FRAGMENT,
+        uniforms: this.softness,
         transparent: true,
         depthWrite: false,
       }),

@@ -9,9 +9,9 @@ export const SPEEDS = [0.25, 0.5, 0.75, 1, 1.25, 1.5, 2];
 export const SOUNDS = ["played", "wanted", "none"] as const;
 export type SoundName = (typeof SOUNDS)[number];
 const SOUND_LABELS: Record<SoundName, string> = {
-  played: "Sound: played",
-  wanted: "Sound: score",
-  none: "Sound: off",
+  played: "Played",
+  wanted: "Score",
+  none: "Silent",
 };
 
 /** What the bar lets people do. */
@@ -65,8 +65,12 @@ export class PlayerBar {
     value: "0",
     "aria-label": "Time",
   });
-  private readonly speed = make("select", { "aria-label": "Speed", title: "Speed (+ and -)" });
-  private readonly sound = make("select", { "aria-label": "Sound", title: "Sound (m: off)" });
+  private readonly speed = make("select", {
+    class: "speed",
+    "aria-label": "Speed",
+    title: "Speed (+ and -)",
+  });
+  private readonly sound = make("select", { "aria-label": "Sound", title: "Sound (m: silent)" });
   private tenths = "";
   private place = -1;
   private reach = -1;
@@ -93,6 +97,8 @@ export class PlayerBar {
     const on = button("on", "One frame on", ".", () => {
       actions.frame(1);
     });
+    back.classList.add("step");
+    on.classList.add("step");
     this.loop = button("loop", "Loop a stretch", "[ and ]", () => {
       actions.toggleLoop();
     });
@@ -114,7 +120,12 @@ export class PlayerBar {
     });
     const help = make(
       "button",
-      { type: "button", "aria-label": "Keyboard shortcuts", title: "Keyboard shortcuts (?)" },
+      {
+        type: "button",
+        class: "help",
+        "aria-label": "Keyboard shortcuts",
+        title: "Keyboard shortcuts (?)",
+      },
       "?",
     );
     help.addEventListener("click", () => {

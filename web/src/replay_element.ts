@@ -28,6 +28,9 @@ const FRAMES_PER_SECOND = 60;
 /** Frames whose own work `stepCost` is the mean of. */
 const COSTS = 240;
 
+/** [ms] A picture that has not changed for so long is drawn again at its best. */
+const REST = 300;
+
 type State = "empty" | "loading" | "planning" | "growing" | "done" | "failed";
 
 interface Fault {
@@ -76,6 +79,7 @@ export class ReplayElement extends HTMLElement implements Showing {
   private isUntouched = true;
   private readonly costs = new Float64Array(COSTS);
   private frames = 0;
+  private drawnAt = 0;
 
   private readonly calm = matchMedia("(prefers-reduced-motion: reduce)");
   private readonly darkness = matchMedia("(prefers-color-scheme: dark)");
@@ -453,9 +457,12 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.frames++;
     }
     if (view?.isPrepared && draws) {
-      view.draw();
+      view.draw(true);
       view.watchSpeed(passed);
       view.rig.still = false;
+      this.drawnAt = now;
+    } else if (view?.isPrepared && now - this.drawnAt > REST && view.rest()) {
+      view.draw(false);
     }
     if (this.settle && (data.motion?.poses ?? 0) > 0 && (view?.isPrepared ?? this.fallback)) {
       this.settle.resolve();

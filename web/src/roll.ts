@@ -165,7 +165,7 @@ export class Roll {
       if (isBlack(key)) draw.fillRect(0, this.y(key), width, this.row());
     }
     draw.globalAlpha = 1;
-    const step = [0.25, 0.5, 1, 2, 5, 10, 30, 60, 300].find((s) => s / this.span > 0.075) ?? 600;
+    const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60, 300].find((s) => s / this.span > 0.075) ?? 600;
     draw.font = "11px system-ui, sans-serif";
     draw.textBaseline = "middle";
     for (let time = Math.max(Math.ceil(this.from / step), 0) * step; ; time += step) {
@@ -203,12 +203,13 @@ export class Roll {
       const y = this.y(notes.key[i]!);
       const length = Math.max(this.x(notes.offset[i]!) - x, 2);
       draw.rect(x + 0.5, y + 0.5, length - 1, row - 1);
-      if (missed) {
-        draw.moveTo(x + 1, y + row / 2);
-        draw.lineTo(x + length - 1, y + row / 2);
-      }
     });
-    draw.lineWidth = paint === 3 ? 2 : 1;
+    if (paint === 3) {
+      draw.globalAlpha = 0.2;
+      draw.fill();
+      draw.globalAlpha = 1;
+    }
+    draw.lineWidth = paint === 3 ? 1.5 : 1;
     draw.stroke();
   }
 

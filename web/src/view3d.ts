@@ -90,7 +90,7 @@ export class View3D {
   private slowFor = 0;
   private width = 16;
   private height = 9;
-  private ratio = 0;
+  private movingRatio = 1;
   private revision = -1;
 
   constructor(
@@ -118,7 +118,9 @@ export class View3D {
   /** Make the shaders, while the page stays usable. */
   async prepare(): Promise<void> {
     this.moveCamera(0);
-    await this.renderer.compileAsync(this.scene, this.camera);
+    if (this.renderer.extensions.has("KHR_parallel_shader_compile")) {
+      await this.renderer.compileAsync(this.scene, this.camera);
+    }
     this.isPrepared = true;
   }
 
@@ -158,16 +160,29 @@ export class View3D {
     return this.rig.update(passed, this.width / this.height, this.wrists);
   }
 
+  /** Draw a picture that stands still at its best; says whether that is still to be done. */
+  rest(): boolean {
+    const ratio = Math.min(devicePixelRatio, QUALITIES[0]!.ratio);
+    if (this.renderer.getPixelRatio() >= Math.min(ratio, 1)) return false;
+    this.renderer.setPixelRatio(Math.min(ratio, 1));
+    return true;
+  }
+
   /** Take up a size of the page's canvas [px]; says whether that changes anything. */
   resize(width: number, height: number): boolean {
-    const ratio = this.renderer.getPixelRatio();
-    if (width === this.width && height === this.height && ratio === this.ratio) return false;
-    [this.width, this.height, this.ratio] = [width, height, ratio];
+    if (width === this.width && height === this.height) return false;
+    [this.width, this.height] = [width, height];
     this.renderer.setSize(width, height, false);
     return true;
   }
 
-  draw(): void {
+  /**
+   * @param moving whether the next picture comes at once, and this one may be coarse.
+   */
+  draw(moving: boolean): void {
+    if (moving && this.renderer.getPixelRatio() !== this.movingRatio) {
+      this.renderer.setPixelRatio(this.movingRatio);
+    }
     this.renderer.render(this.scene, this.camera);
   }
 
@@ -198,6 +213,7 @@ export class View3D {
   private applyQuality(): void {
     const { ratio, shadows } = QUALITIES[this.quality]!;
     this.renderer.setPixelRatio(ratio < 1 ? ratio : Math.min(devicePixelRatio, ratio));
+    this.movingRatio = this.renderer.getPixelRatio();
     this.sun.castShadow = shadows;
     this.piano.setShadows(shadows);
   }
