@@ -75,7 +75,7 @@ const FRAGMENT = /* glsl */ `
     float soft = max(fwidth(out_), 1e-5);
     float alpha = 1.0 - smoothstep(-soft, 0.0, out_);
     vec3 color = mix(tone, tone * 0.68, black);
-    color = mix(color, vec3(1.0), 0.22 * sounding);
+    color = mix(color, vec3(1.0), 0.12 * sounding);
     float rim = smoothstep(-0.0016 - soft, -0.0016, out_);
     if (missed > 0.5) {
       // Hollow, as in the roll: it was asked for and did not sound.
