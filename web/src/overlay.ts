@@ -78,6 +78,14 @@ export class Overlay {
     show(this.message, message !== null);
   }
 
+  /** Show how much of a film is made; null where none is. */
+  setFilming(part: number | null): void {
+    show(this.planning, part !== null);
+    if (part === null) return;
+    setText(this.phase, "Making the film");
+    this.progress.value = part;
+  }
+
   /**
    * Show what there is to wait for.
    *

@@ -7,10 +7,12 @@ import type { Showing } from "./clock";
 import { Clock } from "./clock";
 import { make } from "./dom";
 import { Fallback } from "./fallback";
+import { film } from "./film";
 import type { Head, Quad, Triple } from "./format";
 import { helpDialog } from "./help";
 import { Kinematics } from "./kinematics";
 import style from "./look.css?inline";
+import type { Look } from "./look";
 import { isMissed, lookOf } from "./look";
 import { Overlay } from "./overlay";
 import type { SoundName } from "./player_bar";
@@ -30,6 +32,10 @@ const COSTS = 240;
 
 /** [ms] A picture that has not changed for so long is drawn again at its best. */
 const REST = 300;
+
+/** [px] */
+const FILM_WIDTH = 1280;
+const FILM_HEIGHT = 720;
 
 type State = "empty" | "loading" | "planning" | "growing" | "done" | "failed";
 
@@ -69,6 +75,7 @@ export class ReplayElement extends HTMLElement implements Showing {
 
   private loading: AbortController | null = null;
   private settle: { resolve: () => void; reject: (reason: Error) => void } | null = null;
+  private filming: AbortController | null = null;
   private lastState: State = "empty";
   private request = 0;
   private lastNow = 0;
@@ -258,6 +265,50 @@ export class ReplayElement extends HTMLElement implements Showing {
     return count > 0 ? sum / count : 0;
   }
 
+  /**
+   * Make a film of the picture and the sound: of the loop, or else of the whole.
+   *
+   * @param fps frames per second.
+   * @returns the film as WebM.
+   * @throws Error if there is no picture, or the browser encodes no films.
+   */
+  async record(fps: number): Promise<Blob> {
+    const { view, data } = this;
+    if (!view?.isPrepared || this.filming) throw new Error("There is no picture to film.");
+    const filming = new AbortController();
+    this.filming = filming;
+    this.pause();
+    const [from, to] = this.clock.loop ?? [0, Math.max(this.available, 0)];
+    const canvas = make("canvas", { width: String(FILM_WIDTH), height: String(FILM_HEIGHT) });
+    const background = canvas.getContext("2d")!;
+    view.beginFilm(FILM_WIDTH, FILM_HEIGHT);
+    try {
+      return await film({
+        width: FILM_WIDTH,
+        height: FILM_HEIGHT,
+        fps,
+        from,
+        to,
+        sound: this.soundName === "none" ? null : this.playsSound,
+        draw: (time) => {
+          view.update(data, time, this.shown);
+          view.moveCamera(1 / fps);
+          paintBackdrop(background, lookOf(this));
+          background.drawImage(view.drawFilm(), 0, 0);
+          return canvas;
+        },
+        progress: (part) => {
+          this.overlay.setFilming(part);
+        },
+        signal: filming.signal,
+      });
+    } finally {
+      this.filming = null;
+      this.overlay.setFilming(null);
+      this.isStale = true;
+    }
+  }
+
   connectedCallback(): void {
     if (connected.has(this)) return;
     connected.add(this);
@@ -296,6 +347,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     cancelAnimationFrame(this.request);
     this.loading?.abort();
     this.loading = null;
+    this.filming?.abort();
     this.clock.leave(this);
     this.ownClock.pause();
     this.darkness.removeEventListener("change", this.takeLook);
@@ -424,6 +476,7 @@ export class ReplayElement extends HTMLElement implements Showing {
   private readonly frame = (now: number): void => {
     this.request = requestAnimationFrame(this.frame);
     const start = performance.now();
+    if (this.filming) return;
     const time = this.clock.tick(now);
     const { state } = this;
     if (state !== this.lastState) {
@@ -586,7 +639,10 @@ export class ReplayElement extends HTMLElement implements Showing {
         if (document.fullscreenElement) void document.exitFullscreen();
         else void this.requestFullscreen();
       },
-      film: () => undefined,
+      film: () => {
+        if (this.filming) this.filming.abort();
+        else void this.saveFilm();
+      },
       help: () => {
         this.help.showModal();
       },
@@ -598,6 +654,21 @@ export class ReplayElement extends HTMLElement implements Showing {
       },
       steer: (event) => this.view !== null && steerByKey(event, this.view.rig),
     };
+  }
+
+  private async saveFilm(): Promise<void> {
+    try {
+      const address = URL.createObjectURL(await this.record(FRAMES_PER_SECOND));
+      const name = (this.head?.title ?? "").replace(/[^\p{L}\p{N}_-]+/gu, "-") || "performance";
+      make("a", { href: address, download: `${name}.webm` }).click();
+      // The browser has taken hold of the film by then.
+      setTimeout(() => {
+        URL.revokeObjectURL(address);
+      }, 60_000);
+    } catch (reason) {
+      if (reason instanceof DOMException && reason.name === "AbortError") return;
+      this.overlay.setMessage(reason instanceof Error ? reason.message : String(reason));
+    }
   }
 
   private showFault(direction: 1 | -1): void {
@@ -613,6 +684,23 @@ export class ReplayElement extends HTMLElement implements Showing {
     this.currentTime = next.time;
     this.roll.tell(next);
   }
+}
+
+/** The soft light behind the picture, which the style sheet has for the page itself. */
+function paintBackdrop(draw: CanvasRenderingContext2D, look: Look): void {
+  const { width, height } = draw.canvas;
+  const light = draw.createRadialGradient(
+    width / 2,
+    0.45 * height,
+    0,
+    width / 2,
+    0.45 * height,
+    0.55 * width,
+  );
+  light.addColorStop(0, look.glow);
+  light.addColorStop(1, look.page);
+  draw.fillStyle = light;
+  draw.fillRect(0, 0, width, height);
 }
 
 function failureText(reason: unknown): string {

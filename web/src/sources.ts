@@ -18,13 +18,23 @@ export async function fromAddress(
 export function fromPage(id: string): ReadableStream<Uint8Array<ArrayBuffer>> {
   const script = document.getElementById(id);
   if (!script) throw new Error(`The page holds no replay "${id}".`);
-  const letters = atob(script.textContent.trim());
-  const bytes = new Uint8Array(letters.length);
-  for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
+  const bytes = fromBase64(script.textContent.trim());
   return new ReadableStream({
     start(controller) {
       controller.enqueue(bytes);
       controller.close();
     },
   });
+}
+
+/** The bytes that an address of the kind `data:TYPE;base64,...` itself holds. */
+export function bytesOfDataUrl(address: string): Uint8Array<ArrayBuffer> {
+  return fromBase64(address.slice(address.indexOf(",") + 1));
+}
+
+function fromBase64(text: string): Uint8Array<ArrayBuffer> {
+  const letters = atob(text);
+  const bytes = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
+  return bytes;
 }

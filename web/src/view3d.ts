@@ -160,6 +160,19 @@ export class View3D {
     return this.rig.update(passed, this.width / this.height, this.wrists);
   }
 
+  /** Draw in a given size [px], and as well as can be, until `resize` is called again. */
+  beginFilm(width: number, height: number): void {
+    this.renderer.setPixelRatio(1);
+    this.renderer.setSize(width, height, false);
+    [this.width, this.height] = [width, height];
+  }
+
+  /** Draw a film's frame, and hand over the canvas that it is on. */
+  drawFilm(): HTMLCanvasElement {
+    this.renderer.render(this.scene, this.camera);
+    return this.renderer.domElement;
+  }
+
   /** Draw a picture that stands still at its best; says whether that is still to be done. */
   rest(): boolean {
     const ratio = Math.min(devicePixelRatio, QUALITIES[0]!.ratio);
