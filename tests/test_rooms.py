@@ -32,6 +32,7 @@ ROOMS = (
     ("evaluation",),
     ("replay",),
     ("report",),
+    ("stage",),
     ("commands",),
     ("cli",),
     ("__main__",),

@@ -68,6 +68,7 @@ COMMANDS = {
     "score": Command(
         "pianomime.commands.score", "ScorePlaying", "score anybody's playing of a song"
     ),
+    "stage": Command("pianomime.commands.stage", "StageCommand", "watch songs being played, in 3D"),
     "gallery": Command(
         "pianomime.commands.gallery",
         "Gallery",

@@ -32,6 +32,7 @@ from tornado.web import Application, HTTPError, RequestHandler
 
 from pianomime.errors import InputError
 
+_ANY, _NAME = re.escape("{}"), "([-.\\w]+)"
 _HOST = "127.0.0.1"
 _LAST_PORT = 65535
 _USUAL_PORT = 80
@@ -60,7 +61,8 @@ class LocalHandler(RequestHandler):
         self.set_header("Cache-Control", "no-store")
         self.set_header(
             "Content-Security-Policy",
-            "default-src 'self'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
+            "default-src 'self'; style-src 'unsafe-inline'; media-src 'self' blob:; "
+            "img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
             "frame-ancestors 'none'",
         )
         self.set_header("Cross-Origin-Resource-Policy", "same-origin")
@@ -123,8 +125,9 @@ class LocalServer:
         """Begin to serve.
 
         Args:
-            handlers: for each path behind the secret, such as "" or "picture.png", the class that
-                answers, and the arguments of its `initialize`.
+            handlers: for each path behind the secret, such as "", "picture.png" or "jobs/{}", the
+                class that answers, and the arguments of its `initialize`. What stands where the
+                path has {}, letters, digits, dots, hyphens and underscores, its methods are given.
             port: of the server; 0 for any free one.
 
         Raises:
@@ -144,7 +147,7 @@ class LocalServer:
         if port == _USUAL_PORT:  # Browsers leave it out.
             hosts += names
         rules = [
-            (f"/[^/]*/{re.escape(path)}", kind, dict(given))
+            (f"/[^/]*/{re.escape(path).replace(_ANY, _NAME)}", kind, dict(given))
             for path, (kind, given) in handlers.items()
         ]
         self._application = Application(

@@ -37,6 +37,9 @@ PEAK = 0.9
 TAIL = 1.5
 """[s] Time for the last note to fade."""
 
+_LIVE_AHEAD = 0.02
+"""[s] The synthesizer may stop a sample before the last event."""
+
 RING = 10
 """[s] Time after which every string has faded, so that neither key nor pedal makes a difference."""
 
@@ -107,29 +110,9 @@ class Sound:
         """
         begin = index * BLOCK_SECONDS
         count = min(self._block, self.samples - index * self._block)
-        audio = np.zeros((count, 2), np.float32)
-        if not len(self._score):
-            return audio
-        # What was struck before still sounds; all voices begin where they would in the whole.
-        origin = begin - min(begin, RING)
-        stop = begin + count / self.sample_rate
-        if index + 1 < self.block_count:
-            stop += TAIL  # a conversion looks ahead
-        heard = (self._score.onset >= origin) & (self._score.onset < stop)
-        # The synthesizer stops at the last event, so a pedal move is added at the end.
-        end = stop - origin
-        pedal = np.clip(self._score.pedal - origin, 0.0, end)
-        part = replace(
-            self._score,
-            key=self._score.key[heard],
-            onset=self._score.onset[heard] - origin,
-            offset=np.minimum(self._score.offset[heard] - origin, end),
-            velocity=self._score.velocity[heard],
-            pedal=np.append(pedal, [[end - 0.01, end]], axis=0),
-        )
-        made = _synthesized(part, self.sample_rate)[(begin - origin) * self.sample_rate :][:count]
-        audio[: len(made)] = made
-        return audio
+        # A conversion looks ahead.
+        ahead = TAIL if index + 1 < self.block_count else 0.0
+        return _samples_between(self._score, begin, count, ahead, self.sample_rate)
 
     def _partials(self, index: int) -> NDArray[np.float32]:
         """(s, 2) A block of the sound of decaying partials, with the bass to the left."""
@@ -137,6 +120,65 @@ class Sound:
         audio = np.zeros((min(self._block, self.samples - first), 2), np.float32)
         _play_partials(self._score, self._end, self.sample_rate, first, audio)
         return audio
+
+
+def live_sound(
+    score: Score, begin: float, seconds: float, sample_rate: int = SAMPLE_RATE
+) -> NDArray[np.float32]:
+    """The sound of a stretch of music whose end is not known yet. It is not scaled.
+
+    Stretches that follow one another are one sound, as long as what was to come changes no note of
+    before.
+
+    Args:
+        score: all that was played so far, up to the end of the stretch; a note that still sounds
+            then ends later.
+        begin: where the stretch begins, a multiple of 1 / `sample_rate` [s].
+        seconds: its length.
+        sample_rate: samples per second [Hz].
+
+    Returns:
+        (s, 2) left and right.
+    """
+    count = round(seconds * sample_rate)
+    try:
+        return _samples_between(score, begin, count, _LIVE_AHEAD, sample_rate)
+    except _NoSamplesError:
+        audio = np.zeros((count, 2), np.float32)
+        _play_partials(score, _damped(score), sample_rate, round(begin * sample_rate), audio)
+        return audio
+
+
+def _samples_between(
+    score: Score, begin: float, count: int, ahead: float, sample_rate: int
+) -> NDArray[np.float32]:
+    """(count, 2) The sound of a sampled piano from a time [s] on.
+
+    Raises:
+        _NoSamplesError: there is no such piano.
+    """
+    audio = np.zeros((count, 2), np.float32)
+    if not len(score):
+        return audio
+    # What was struck before still sounds; all voices begin where they would in the whole.
+    origin = begin - min(begin, RING)
+    stop = begin + count / sample_rate + ahead
+    heard = (score.onset >= origin) & (score.onset < stop)
+    # The synthesizer stops at the last event, so a pedal move is added at the end.
+    end = stop - origin
+    pedal = np.clip(score.pedal - origin, 0.0, end)
+    part = replace(
+        score,
+        key=score.key[heard],
+        onset=score.onset[heard] - origin,
+        offset=np.minimum(score.offset[heard] - origin, end),
+        velocity=score.velocity[heard],
+        pedal=np.append(pedal, [[end - 0.01, end]], axis=0),
+    )
+    first = round((begin - origin) * sample_rate)
+    made = _synthesized(part, sample_rate)[first:][:count]
+    audio[: len(made)] = made
+    return audio
 
 
 def render_audio(score: Score, sample_rate: int = SAMPLE_RATE) -> NDArray[np.float32]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,7 @@ from pianomime.keyboard import FRAME_RATE, FRAME_SECONDS, KEYS
 from pianomime.music import Score
 from pianomime.plan import Planner
 from pianomime.players.performance import Performance
-from pianomime.players.rollout import rollout
+from pianomime.players.rollout import Step, rollout
 from pianomime.players.sounding_notes import SoundingNotes
 from pianomime.progress import Progress, no_progress, telling
 from pianomime.short_repr import short_repr
@@ -22,6 +24,19 @@ from pianomime.world import World
 from pianomime.world.layout import LAYOUT
 from pianomime.world.touch import DEFAULT_TOUCH
 from pianomime.world_names import PAPER
+
+
+class Observer(Protocol):
+    """Looks on while a score is played, as the stage does."""
+
+    def planned(self, controller: Controller) -> None:
+        """See who will play, and by what plan."""
+
+    def watch(self, world: World) -> None:
+        """See the world after a physics step."""
+
+    def played(self, step: Step) -> None:
+        """See what was done in a frame, after its last physics step."""
 
 
 class Player(ABC):
@@ -56,13 +71,19 @@ class Player(ABC):
             InputError: this player cannot play this score.
         """
 
-    def play(self, score: Score, progress: Progress = no_progress) -> Performance:
+    def play(
+        self,
+        score: Score,
+        progress: Progress = no_progress,
+        observer: Observer | None = None,
+    ) -> Performance:
         """Perform a score in a new World, of the name that it plays in.
 
         Args:
             score: what to play; all of it is played (see `pianomime.excerpt`).
             progress: called with the phase "planning", then with those that the planner and the
                 tracker tell (see `pianomime.progress.tell`), and with "playing".
+            observer: is told what happens while it happens; it changes nothing.
 
         Returns:
             What happened. Its `plan_seconds` is the time that `start` took; a player that plans
@@ -76,6 +97,8 @@ class Player(ABC):
         with telling(progress):
             controller = self.start(score)
         planned = time.perf_counter()
+        if observer is not None:
+            observer.planned(controller)
 
         frames = score.frames()
         ctrl = []
@@ -85,7 +108,8 @@ class Player(ABC):
         pedal = np.empty(frames, bool)
         blow_ups = np.zeros(frames, np.int64)
         world, notes = World(self.world), SoundingNotes()
-        for step in rollout(controller, world, score.pedal_roll()):
+        watch = None if observer is None else partial(observer.watch, world)
+        for step in rollout(controller, world, score.pedal_roll(), watch):
             frame = step.frame
             ctrl.append(np.atleast_2d(step.ctrl))
             pedal[frame] = step.pedal
@@ -93,6 +117,8 @@ class Player(ABC):
             qpos[frame], key_state[frame] = world.qpos, world.key_state
             pressed[frame] = world.pressed
             blow_ups[frame] = world.blow_ups
+            if observer is not None:
+                observer.played(step)
             progress("playing", frame + 1, frames)
         works_pedal = isinstance(controller, PedalController)
         return Performance(

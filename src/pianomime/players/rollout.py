@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +31,12 @@ class Step(NamedTuple):
     key_events: KeyEvents
 
 
-def rollout(controller: Controller, world: World, pedal: NDArray[np.bool_]) -> Iterator[Step]:
+def rollout(
+    controller: Controller,
+    world: World,
+    pedal: NDArray[np.bool_],
+    watch: Callable[[], None] | None = None,
+) -> Iterator[Step]:
     """Play frame after frame, and yield each when the world is in the state after it.
 
     Args:
@@ -39,6 +44,7 @@ def rollout(controller: Controller, world: World, pedal: NDArray[np.bool_]) -> I
             that works the pedal gives that as well.
         world: where it is played, in the state before the first frame.
         pedal: (T,) bool, the pedal of the score in every frame.
+        watch: called after each physics step, as of `World.step`.
     """
     pedalling = controller if isinstance(controller, PedalController) else None
     parts = controls_per_frame(controller)
@@ -47,7 +53,7 @@ def rollout(controller: Controller, world: World, pedal: NDArray[np.bool_]) -> I
         for part in range(parts):
             sent.append(controller.control(frame * parts + part, world))
             down = bool(pedal[frame]) if pedalling is None else pedalling.pedal(frame)
-            world.step(sent[-1], down, parts=parts)
+            world.step(sent[-1], down, watch, parts)
             events = events.followed_by(world.key_events.later(part * FRAME_SECONDS / parts))
         ctrl = sent[0] if parts == 1 else np.array(sent)
         yield Step(frame, ctrl, down, events)

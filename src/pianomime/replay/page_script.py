@@ -6,22 +6,26 @@ from importlib.resources import files
 
 from pianomime.errors import InputError
 
-_NAME = "replay.js"
+REPLAY_SCRIPT = "replay.js"
 
 
 class PageMissing(InputError):  # noqa: N818 - a property of the installation
     """The script was not built; the message is one line that says how to."""
 
 
-def page_script() -> str:
-    """The JavaScript module that registers the element `<pianomime-replay>`.
+def page_script(name: str = REPLAY_SCRIPT) -> str:
+    """A JavaScript module: that which registers the element `<pianomime-replay>`, or another.
+
+    Args:
+        name: of the file.
 
     Raises:
         PageMissing: it was not built.
     """
-    script = files("pianomime.replay") / "page" / _NAME
+    script = files("pianomime.replay") / "page" / name
     if not script.is_file():
         raise PageMissing(
-            "no hands in the page: its script is not built; from a checkout, `./do page` builds it"
+            "no hands in 3D: the script of the page is not built; from a checkout, `./do page` "
+            "builds it"
         )
     return script.read_text("utf-8")

@@ -58,6 +58,7 @@ def write_report(
     video: bool,
     progress: Progress,
     note: Callable[[str], None],
+    keep_parts: bool = False,
 ) -> Row:
     """Write the files of a report, `FILES`.
 
@@ -67,6 +68,7 @@ def write_report(
         video: whether to render a film, if this machine can.
         progress: called in the phases "saving", "sound", "pictures", "rendering" and "page".
         note: called with one line that says what could not be made and why.
+        keep_parts: leave sounds and replay beside the page also where it holds them.
 
     Returns:
         The summary, as in `report.json`.
@@ -113,7 +115,7 @@ def write_report(
     )
     (folder / "report.html").write_text(html, encoding="utf-8")
     for name, address in zip((*_SOUNDS, _REPLAY), (played_mp3, wanted_mp3, replay), strict=True):
-        if address != name:  # the page holds it
+        if address != name and not keep_parts:  # the page holds it
             (folder / name).unlink()
     (folder / "report.json").write_text(
         json.dumps(row, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"

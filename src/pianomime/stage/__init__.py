@@ -1,0 +1,1 @@
+"""The stage: an app in the browser, on this machine, in which songs are played and watched."""

@@ -1,0 +1,120 @@
+"""What a worker process of the stage does: play a song, or prepare a saved performance."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pianomime.file_names import file_name
+from pianomime.files import staged
+from pianomime.keyboard import LEAD_IN_SECONDS
+from pianomime.music import Score
+from pianomime.music.sound import live_sound
+from pianomime.players.casting import Casting
+from pianomime.players.performance import Performance
+from pianomime.players.registry import load_player
+from pianomime.progress import no_progress
+from pianomime.replay import Judgement, done_block, heard_block, notes_block, scene_block
+from pianomime.replay.blocks import json_block
+from pianomime.report import FILES, write_report
+from pianomime.stage.live import LiveReplay
+from pianomime.workers import Answer, Row
+
+WORKER = "pianomime.stage.playing:load"
+
+REPLAY, SOUND = "live.replay", "live.mp3"
+"""Files in the folder of a job that grow while it goes on."""
+REPORT = "report"
+"""Folder in that of a job for the report of a performance that was saved before."""
+
+
+def load(setup: dict[str, str]) -> Answer:
+    """What answers requests, for `pianomime.workers.Worker`.
+
+    Args:
+        setup: `out`, the folder in which reports of what is played are kept.
+    """
+    out = Path(setup["out"])
+    _warm_up()
+
+    def answer(request: dict[str, Any]) -> Row:
+        folder = Path(request["folder"])
+        with (folder / REPLAY).open("wb", buffering=0) as replay:
+            if "performance" in request:
+                report = _prepare(Path(request["performance"]), folder / REPORT, replay)
+            else:
+                with (folder / SOUND).open("wb", buffering=0) as sound:
+                    report = _play(request, out, replay, sound)
+        return {"report": os.fspath(report)}
+
+    return answer
+
+
+def _warm_up() -> None:
+    """Load what playing needs, so that a song can begin at once."""
+    onset = np.array([0.5, 0.7, 0.9, 1.1])
+    score = Score(np.array([40, 42, 44, 45]), onset, onset + 0.1, np.full(4, 64))
+    load_player("zero-shot", effort=0).play(score)
+    live_sound(score, 0.0, 1.0)
+    scene_block()
+
+
+def _play(request: dict[str, Any], out: Path, replay: Any, sound: Any) -> Path:
+    """Play a song, and write the report; its folder."""
+    casting = Casting.of(request["player"], request["effort"], 0, request["world"])
+    lead_in = LEAD_IN_SECONDS if casting.takes_lead_in else 0.0
+    seconds = np.inf if request["seconds"] is None else request["seconds"]
+    player, score = casting.cast(Path(request["song"]), 0.0, seconds, lead_in)
+    live = LiveReplay(score, player, replay, sound)
+    performance = player.play(score, live.progress, live)
+    live.close()
+    judgement = Judgement.of(performance)
+    replay.write(notes_block(score, performance.plan, judgement))
+    replay.write(heard_block(performance.played(), 0, judgement))
+    with _new_folder(out, file_name(score.title)) as folder:
+        row = _report(performance, folder)
+    replay.write(done_block(row))
+    return folder
+
+
+def _prepare(path: Path, folder: Path, replay: Any) -> Path:
+    """Write the report of a saved performance; its folder."""
+    replay.write(json_block("PLAN", {"phase": "preparing", "done": 0, "total": 0}))
+    _report(Performance.load(path), folder)
+    with gzip.open(folder / "performance.replay.gz") as blocks:
+        shutil.copyfileobj(blocks, replay)
+    return folder
+
+
+def _report(performance: Performance, folder: Path) -> Row:
+    # What could not be made, as the script of the page, is told where the stage is started.
+    with staged(folder, FILES) as inside:
+        return write_report(
+            performance, inside, False, no_progress, lambda _: None, keep_parts=True
+        )
+
+
+@contextmanager
+def _new_folder(out: Path, name: str) -> Iterator[Path]:
+    """A folder of a name that is not taken; it is removed again if nothing comes of it."""
+    out.mkdir(parents=True, exist_ok=True)
+    for number in count(1):
+        folder = out / (name if number == 1 else f"{name}-{number}")
+        try:
+            folder.mkdir()
+            break
+        except FileExistsError:
+            continue
+    try:
+        yield folder
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise

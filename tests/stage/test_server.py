@@ -1,0 +1,276 @@
+"""The server of the stage: what it gives, to whom, and what it refuses."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import struct
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlsplit
+
+import numpy as np
+import pytest
+
+from pianomime import Performance, Score, load_player, songs
+from pianomime.keyboard import LEAD_IN_SECONDS
+from pianomime.music.excerpt import excerpt
+from pianomime.stage.server import LARGEST_SONG, Stage
+
+SECONDS = 2.0
+
+
+class Client:
+    """A page of the stage."""
+
+    def __init__(self, stage: Stage, page: str = "one") -> None:
+        address = urlsplit(stage.url)
+        self.host, self.secret, self.page = address.netloc, address.path, page
+
+    def open(
+        self, method: str, path: str, body: bytes = b"", **headers: str
+    ) -> http.client.HTTPResponse:
+        connection = http.client.HTTPConnection(self.host, timeout=60)
+        own = {"Origin": f"http://{self.host}", "X-Page": self.page}
+        given = {name.replace("_", "-"): value for name, value in headers.items()}
+        connection.request(method, self.secret + path, body or None, {**own, **given})
+        return connection.getresponse()
+
+    def json(self, method: str, path: str, body: Any = None, **headers: str) -> Any:
+        content = body if isinstance(body, bytes) else json.dumps(body).encode() if body else b""
+        answer = self.open(method, path, content, **headers)
+        text = answer.read()
+        assert answer.status == 200, text
+        return json.loads(text)
+
+    def refused(self, method: str, path: str, body: bytes = b"", **headers: str) -> tuple[int, str]:
+        answer = self.open(method, path, body, **headers)
+        assert answer.status >= 400
+        return answer.status, answer.read().decode().strip()
+
+    def play(self, title: str = "beethoven-ode-to-joy", **more: Any) -> str:
+        (song,) = [song for song in self.json("GET", "library")["songs"] if song["title"] == title]
+        asked = {"song": song["id"], "player": "zero-shot", "effort": 0, "seconds": SECONDS}
+        return str(self.json("POST", "jobs", {**asked, **more})["id"])
+
+
+def blocks(replay: bytes) -> list[tuple[str, bytes]]:
+    found = []
+    while replay:
+        length = struct.unpack("<I", replay[4:8])[0]
+        found.append((replay[:4].decode(), replay[8 : 8 + length]))
+        replay = replay[8 + length :]
+    return found
+
+
+def last(found: list[tuple[str, bytes]], tag: str) -> Any:
+    return json.loads([content for name, content in found if name == tag][-1])
+
+
+def wait_for(what: Callable[[], bool]) -> None:
+    for _ in range(600):
+        if what():
+            return
+        time.sleep(0.05)
+    pytest.fail("it does not come")
+
+
+def test_a_song_is_played_as_play_would_and_kept(stage: Stage, tmp_path: Path) -> None:
+    client = Client(stage)
+    job = client.play()
+    first = client.open("GET", f"jobs/{job}/replay")
+    second = client.open("GET", f"jobs/{job}/replay")
+    sound = client.open("GET", f"jobs/{job}/sound").read()
+    found = blocks(first.read())
+    assert blocks(second.read()) == found
+    tags = [tag for tag, _ in found]
+    assert tags[:2] == ["HEAD", "SCEN"]
+    assert tags[-1] == "DONE"
+    # What comes while it is played is not all at once.
+    assert tags.count("MOVE") > 2
+
+    score = Score.from_midi(songs.path("beethoven-ode-to-joy"))
+    wanted = load_player("zero-shot", effort=0).play(excerpt(score, 0.0, SECONDS, LEAD_IN_SECONDS))
+    kept = Performance.load(tmp_path / "out" / "beethoven-ode-to-joy" / "performance.npz")
+    for name in ("ctrl", "qpos", "event_key", "event_on", "event_off", "event_speed"):
+        np.testing.assert_array_equal(getattr(kept, name), getattr(wanted, name), err_msg=name)
+    heard = last(found, "HEAR")
+    np.testing.assert_allclose(heard["on"], wanted.event_on, atol=1e-4)
+    assert {*heard["verdict"]} <= {"right", "wrong"}
+    poses = sum(struct.unpack("<II", content[:8])[1] for tag, content in found if tag == "MOVE")
+    assert poses == 1 + 5 * len(wanted)
+
+    # The sound that came while it was played is as long as the music.
+    assert len(sound) * 8 / 128_000 == pytest.approx(wanted.song_seconds, abs=0.2)
+    finished = client.open("GET", f"jobs/{job}/sound").read()
+    part = client.open("GET", f"jobs/{job}/sound", Range="bytes=100-199")
+    assert part.status == 206
+    assert part.read() == finished[100:200]
+    assert client.open("GET", f"jobs/{job}/files/performance.mid").read().startswith(b"MThd")
+    (listed,) = client.json("GET", "library")["performances"]
+    assert listed["title"] == "beethoven-ode-to-joy"
+    shown = client.json("POST", "jobs", {"performance": listed["id"]})["id"]
+    again = blocks(client.open("GET", f"jobs/{shown}/replay").read())
+    assert last(again, "HEAR") == heard
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "headers"),
+    [
+        ("GET", "library", {"Origin": "http://elsewhere"}),
+        ("POST", "jobs", {"Origin": "http://elsewhere"}),
+        ("GET", "library", {"Host": "elsewhere:80"}),
+    ],
+)
+def test_strangers_get_nothing(
+    stage: Stage, method: str, path: str, headers: dict[str, str]
+) -> None:
+    assert Client(stage).refused(method, path, b"{}" * (method == "POST"), **headers)[0] == 403
+
+
+def test_without_the_secret_there_is_nothing(stage: Stage) -> None:
+    client = Client(stage)
+    client.secret = "/guessed/"
+    for method, path in (("GET", "library"), ("GET", ""), ("POST", "songs"), ("POST", "jobs")):
+        assert client.refused(method, path)[0] == 403
+
+
+@pytest.mark.parametrize(
+    ("content", "status", "reason"),
+    [
+        (b"", 400, "empty"),
+        (b"MThd but not really", 400, "evil"),
+        (b"<html>no music</html>", 400, "evil"),
+    ],
+)
+def test_what_is_no_song_is_refused_in_one_line(
+    stage: Stage, tmp_path: Path, content: bytes, status: int, reason: str
+) -> None:
+    name = quote("../../evil<img src=x>.mid")
+    told = Client(stage).refused("POST", "songs", content, X_File_Name=name)
+    assert told[0] == status
+    assert reason in told[1]
+    assert "\n" not in told[1]
+    # Where it lay meanwhile is nobody's business, and nothing of it is left.
+    assert str(tmp_path) not in told[1]
+    assert not list(tmp_path.rglob("*evil*"))
+
+
+def test_a_large_file_is_refused_before_it_is_sent(stage: Stage) -> None:
+    client = Client(stage)
+    connection = http.client.HTTPConnection(client.host, timeout=60)
+    connection.putrequest("POST", f"{client.secret}songs")
+    connection.putheader("Origin", f"http://{client.host}")
+    connection.putheader("Content-Length", str(LARGEST_SONG + 1))
+    connection.endheaders()
+    answer = connection.getresponse()
+    assert (answer.status, b"larger than 4 MB" in answer.read()) == (413, True)
+
+
+def test_a_song_that_is_dropped_is_kept_under_a_name_of_ours(stage: Stage, tmp_path: Path) -> None:
+    client = Client(stage)
+    content = songs.path("petzold-minuet-g").read_bytes()
+    name = quote("../../my <b>song</b>.mid")
+    song = client.json("POST", "songs", content, X_File_Name=name)
+    again = client.json("POST", "songs", content, X_File_Name=name)
+    assert song == again
+    (kept,) = (tmp_path / "out" / "songs").iterdir()
+    assert kept.read_bytes() == content
+    other = client.json(
+        "POST", "songs", songs.path("satie-gymnopedie-1").read_bytes(), X_File_Name=name
+    )
+    assert other["id"] != song["id"]
+    assert kept.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        b"no json",
+        b"[]",
+        b'{"song": "s0"}',
+        b'{"song": "../../etc/passwd", "player": "zero-shot"}',
+        b'{"performance": "p0"}',
+    ],
+)
+def test_what_cannot_be_played_is_refused(stage: Stage, asked: bytes) -> None:
+    assert Client(stage).refused("POST", "jobs", asked)[0] == 400
+
+
+@pytest.mark.parametrize("more", [{"player": "nobody"}, {"effort": 9}, {"world": "flat"}])
+def test_settings_that_are_not_there_are_refused(stage: Stage, more: dict[str, Any]) -> None:
+    client = Client(stage)
+    song = client.json("GET", "library")["songs"][0]["id"]
+    asked = {"song": song, "player": "zero-shot", **more}
+    assert client.refused("POST", "jobs", json.dumps(asked).encode())[0] == 400
+
+
+def test_files_are_those_of_the_report_alone(stage: Stage) -> None:
+    client = Client(stage)
+    job = client.play(seconds=0.5)
+    client.open("GET", f"jobs/{job}/replay").read()
+    for name in ("report.json", "..", "../live.replay", "%2e%2e%2flive.replay", "nothing"):
+        assert client.refused("GET", f"jobs/{job}/files/{name}")[0] == 404
+    assert client.refused("GET", "jobs/none/replay")[0] == 404
+
+
+def test_a_page_has_one_job_and_another_page_its_own(stage: Stage) -> None:
+    client, other = Client(stage), Client(stage, "two")
+    first = client.play(effort=3, seconds=None)
+    apart = other.play(seconds=1.0)
+    replay = client.open("GET", f"jobs/{first}/replay")
+    second = client.play(seconds=1.0)
+    assert "Stopped" in last(blocks(replay.read()), "FAIL")["message"]
+    for page, job in ((client, second), (other, apart)):
+        assert blocks(page.open("GET", f"jobs/{job}/replay").read())[-1][0] == "DONE"
+
+
+def test_what_is_stopped_ends_its_process_and_leaves_nothing(stage: Stage, tmp_path: Path) -> None:
+    client = Client(stage)
+    job = client.play(effort=3, seconds=None)
+    replay = client.open("GET", f"jobs/{job}/replay")
+    assert replay.read(4) == b"HEAD"
+    found = stage.jobs.get(job)
+    assert found is not None
+    pid = found.pid
+    assert client.open("DELETE", f"jobs/{job}").status == 200
+    wait_for(lambda: not _alive(pid))
+    assert [path.name for path in (tmp_path / "out").iterdir() if path.name != "songs"] == []
+
+
+def test_a_page_that_is_closed_stops_its_job(stage: Stage) -> None:
+    client = Client(stage)
+    job = client.play(effort=3, seconds=None)
+    replay = client.open("GET", f"jobs/{job}/replay")
+    assert replay.read(4) == b"HEAD"
+    found = stage.jobs.get(job)
+    assert found is not None
+    replay.close()
+    wait_for(lambda: found.done)
+    assert not _alive(found.pid)
+
+
+def test_a_process_that_is_killed_is_told(stage: Stage) -> None:
+    client = Client(stage)
+    job = client.play(effort=3, seconds=None)
+    replay = client.open("GET", f"jobs/{job}/replay")
+    assert replay.read(4) == b"HEAD"
+    found = stage.jobs.get(job)
+    assert found is not None
+    os.kill(found.pid, 9)
+    rest = replay.read()
+    assert rest[-200:].count(b"FAIL") == 1
+    assert b"process died" in rest[-200:]
+    # The next one plays.
+    assert blocks(client.open("GET", f"jobs/{client.play()}/replay").read())[-1][0] == "DONE"
+
+
+def _alive(pid: int) -> bool:
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text()
+    except FileNotFoundError:
+        return False
+    return status.rpartition(")")[2].split()[0] != "Z"
