@@ -3,6 +3,7 @@ from __future__ import annotations
 import base64
 import errno
 import gzip
+import io
 import json
 import os
 import re
@@ -31,7 +32,7 @@ from pianomime.players.motion import motion
 from pianomime.replay import PageMissing, Poses
 from pianomime.replay.replay import replay_blocks
 from pianomime.report import DARK, FILES, LIGHT, Theme, draw, write_report
-from pianomime.report.mp3 import write_mp3
+from pianomime.report.mp3 import Mp3, write_mp3
 from pianomime.world.render import RenderUnavailable
 
 PROTOCOL = (
@@ -293,6 +294,33 @@ def test_mp3_has_the_length_of_the_sound(tmp_path: Path) -> None:
     with av.open(str(tmp_path / "sound.mp3")) as file:
         decoded = sum(frame.samples for frame in file.decode(audio=0))
     assert decoded / 44100 == pytest.approx(seconds, abs=0.1)
+
+
+def test_mp3_that_is_heard_while_it_comes_is_in_time() -> None:
+    class Wire(io.BytesIO):
+        def seekable(self) -> bool:
+            return False
+
+    rate, wire, sizes = 48_000, Wire(), []
+    sound = np.zeros((4 * rate, 2), np.float32)
+    clicks = np.array([1, 2, 3]) * rate
+    for click in clicks:
+        sound[click : click + 200] = 0.9 * np.sin(np.arange(200) * 0.5)[:, None]
+    with Mp3(wire, rate) as file:
+        for second in range(4):
+            file.add(sound[second * rate :][:rate])
+            sizes.append(len(wire.getvalue()))
+        content = wire.getvalue
+        # What was encoded is there at once.
+        assert np.diff(sizes).min() > 0.9 * 128_000 / 8
+        heard = content()
+    with av.open(io.BytesIO(heard)) as opened:
+        level = np.abs(np.hstack([part.to_ndarray() for part in opened.decode(audio=0)])[0])
+    for click in clicks:
+        apart = np.argmax(level[click - 4800 : click + 4800] > 0.2) - 4800
+        assert abs(apart) / rate < 0.003
+        if click == clicks[-2]:
+            break
 
 
 def test_staged_files_appear_together(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pianomime.music import Score, render_audio, write_wav
-from pianomime.music.sound import MAX_SECONDS, SAMPLE_RATE, TAIL, Sound
+from pianomime.music.sound import MAX_SECONDS, SAMPLE_RATE, TAIL, Sound, live_sound
 from pianomime.music.wav import WavFile, write_wav_blocks
 
 RATE = 8000
@@ -199,3 +199,24 @@ def test_wav_files_are_written_and_read_in_blocks(tmp_path: Path) -> None:
         blocks = list(file.blocks(2.0))
         assert [len(block) for block in blocks] == [1000, 1000, 500]
         np.testing.assert_allclose(np.concatenate(blocks), audio, atol=2e-5)
+
+
+def test_stretches_made_while_music_is_played_are_one_sound() -> None:
+    rng = np.random.default_rng(0)
+    onset = np.sort(rng.uniform(0.0, 5.0, 40))
+    score = Score(
+        rng.integers(20, 70, 40),
+        onset,
+        onset + rng.uniform(0.1, 3.0, 40),
+        rng.integers(30, 120, 40),
+    )
+    whole = live_sound(score, 0.0, 5.0)
+    parts = []
+    for second in range(5):
+        # Of a note that still sounds nobody knows yet how long it will.
+        known = score.onset < second + 1
+        offset = np.where(score.offset > second + 1, 99.0, score.offset)
+        so_far = Score(score.key[known], score.onset[known], offset[known], score.velocity[known])
+        parts.append(live_sound(so_far, float(second), 1.0))
+    np.testing.assert_array_equal(np.vstack(parts), whole)
+    assert np.abs(whole).max() > 0

@@ -29,10 +29,8 @@ import { drawingOn, View3D } from "./view3d";
 const FRAMES_PER_SECOND = 60;
 /** Frames whose own work `stepCost` is the mean of. */
 const COSTS = 240;
-
 /** [ms] A picture that has not changed for so long is drawn again at its best. */
 const REST = 300;
-
 /** [px] */
 const FILM_WIDTH = 1280;
 const FILM_HEIGHT = 720;
@@ -62,6 +60,8 @@ export class ReplayElement extends HTMLElement implements Showing {
   private readonly shown: Shown = { falling: true, numbers: true };
   private faults: Fault[] = [];
   private faultsRevision = -1;
+  /** The one that was shown last. */
+  private fault: Fault | null = null;
 
   private readonly bar: PlayerBar;
   private readonly overlay: Overlay;
@@ -484,7 +484,7 @@ export class ReplayElement extends HTMLElement implements Showing {
       if (state === "growing" || state === "done") this.start();
       this.dispatchEvent(new Event("statechange"));
     }
-    if (!this.isVisible) return;
+    if (!this.isVisible && !this.settle) return;
     const passed = now - this.lastNow;
     this.lastNow = now;
     const { view, data } = this;
@@ -557,6 +557,7 @@ export class ReplayElement extends HTMLElement implements Showing {
   private findFaults(): void {
     const { notes, heard, revision } = this.data;
     this.faultsRevision = revision;
+    this.fault = null;
     const missed = [...notes.key.keys()]
       .filter((place) => isMissed(notes, place))
       .map((place): Fault => ({ time: notes.onset[place]!, kind: "wanted", place }));
@@ -672,14 +673,17 @@ export class ReplayElement extends HTMLElement implements Showing {
   }
 
   private showFault(direction: 1 | -1): void {
-    const { currentTime } = this;
-    const fault =
-      direction > 0
-        ? this.faults.find(({ time }) => time > currentTime + 1e-3)
-        : this.faults.findLast(({ time }) => time < currentTime - 1e-3);
-    // Around the end it goes on at the other side.
-    const next = fault ?? this.faults.at(direction > 0 ? 0 : -1);
+    const { currentTime, faults } = this;
+    const here = this.fault !== null && Math.abs(this.fault.time - currentTime) < 1e-3;
+    // Notes of a chord are missed at one time, so that time alone does not lead from one to the next.
+    const next =
+      here && this.fault
+        ? faults.at((faults.indexOf(this.fault) + direction) % faults.length)
+        : direction > 0
+          ? (faults.find(({ time }) => time > currentTime) ?? faults[0])
+          : (faults.findLast(({ time }) => time < currentTime) ?? faults.at(-1));
     if (!next) return;
+    this.fault = next;
     this.pause();
     this.currentTime = next.time;
     this.roll.tell(next);

@@ -13,7 +13,7 @@ import { Badges } from "./badges";
 import { CameraRig } from "./cameras";
 import { CROSS, signTexture } from "./digits";
 import { FallingNotes } from "./falling_notes";
-import type { SceneContent } from "./format";
+import type { Notes, SceneContent } from "./format";
 import { KEYS } from "./format";
 import { Kinematics } from "./kinematics";
 import type { Look, Paint } from "./look";
@@ -91,7 +91,7 @@ export class View3D {
   private width = 16;
   private height = 9;
   private movingRatio = 1;
-  private revision = -1;
+  private notes: Notes | null = null;
 
   constructor(
     drawing: Drawing,
@@ -145,8 +145,8 @@ export class View3D {
         this.wrists[3 * hand + i] = this.kinematics.pos[3 * this.wristBodies[hand]! + i]!;
       }
     }
-    if (data.revision !== this.revision) {
-      this.revision = data.revision;
+    if (data.notes !== this.notes) {
+      this.notes = data.notes;
       this.falling.setNotes(data.notes);
     }
     this.falling.mesh.visible = shown.falling;
