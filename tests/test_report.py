@@ -310,17 +310,13 @@ def test_mp3_that_is_heard_while_it_comes_is_in_time() -> None:
         for second in range(4):
             file.add(sound[second * rate :][:rate])
             sizes.append(len(wire.getvalue()))
-        content = wire.getvalue
-        # What was encoded is there at once.
-        assert np.diff(sizes).min() > 0.9 * 128_000 / 8
-        heard = content()
-    with av.open(io.BytesIO(heard)) as opened:
+    # What was encoded is there at once.
+    assert np.diff(sizes).min() > 0.9 * 128_000 / 8
+    with av.open(io.BytesIO(wire.getvalue())) as opened:
         level = np.abs(np.hstack([part.to_ndarray() for part in opened.decode(audio=0)])[0])
     for click in clicks:
         apart = np.argmax(level[click - 4800 : click + 4800] > 0.2) - 4800
         assert abs(apart) / rate < 0.003
-        if click == clicks[-2]:
-            break
 
 
 def test_staged_files_appear_together(tmp_path: Path) -> None:
