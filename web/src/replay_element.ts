@@ -27,7 +27,7 @@ import type { Drawing, Shown } from "./view3d";
 import { drawingOn, View3D } from "./view3d";
 
 const FRAMES_PER_SECOND = 60;
-/** Frames whose own work `stepCost` is the mean of. */
+/** Frames whose own work `stepCost` is the median of. */
 const COSTS = 240;
 /** [ms] A picture that has not changed for so long is drawn again at its best. */
 const REST = 300;
@@ -141,7 +141,7 @@ export class ReplayElement extends HTMLElement implements Showing {
 
   /** Address of the sound of what was played. Another one goes on at the same time. */
   get sound(): string | null {
-    return this.getAttribute("sound");
+    return this.getAttribute("sound") ?? this.inside("sound", "audio");
   }
 
   set sound(address: string | null) {
@@ -150,7 +150,7 @@ export class ReplayElement extends HTMLElement implements Showing {
 
   /** Address of the sound of the score. */
   get wanted(): string | null {
-    return this.getAttribute("wanted");
+    return this.getAttribute("wanted") ?? this.inside("wanted", "audio");
   }
 
   set wanted(address: string | null) {
@@ -257,12 +257,13 @@ export class ReplayElement extends HTMLElement implements Showing {
     };
   }
 
-  /** Mean time of the page's own work in a frame [ms], without that of drawing in 3D. */
+  /**
+   * Time of the page's own work in a frame [ms], without that of drawing in 3D: the median, since
+   * on a busy computer a few frames are interrupted.
+   */
   stepCost(): number {
-    const count = Math.min(this.frames, COSTS);
-    let sum = 0;
-    for (let i = 0; i < count; i++) sum += this.costs[i]!;
-    return count > 0 ? sum / count : 0;
+    const costs = this.costs.slice(0, Math.min(this.frames, COSTS)).sort();
+    return costs[costs.length >> 1] ?? 0;
   }
 
   /**
@@ -337,6 +338,17 @@ export class ReplayElement extends HTMLElement implements Showing {
     else this.load();
   }
 
+  /**
+   * Address of what the page has put into the element, to be shown where this script does not run;
+   * said once, a long address is in the page once.
+   */
+  private inside(slot: string, tag: "audio" | "img" | "video"): string | null {
+    const found = this.querySelector<HTMLMediaElement | HTMLImageElement>(
+      `${tag}[slot=${slot}], [slot=${slot}] ${tag}`,
+    );
+    return found ? found.currentSrc || found.src : null;
+  }
+
   private reflect(name: string, value: string | null): void {
     if (value === null) this.removeAttribute(name);
     else this.setAttribute(name, value);
@@ -381,7 +393,10 @@ export class ReplayElement extends HTMLElement implements Showing {
         this.isStale = true;
       });
     } else {
-      this.fallback = new Fallback(this.getAttribute("fallback"), this.getAttribute("film"));
+      this.fallback = new Fallback(
+        this.getAttribute("fallback") ?? this.inside("picture", "img"),
+        this.getAttribute("film") ?? this.inside("film", "video"),
+      );
       this.viewBox.prepend(this.fallback.root);
     }
   }
