@@ -1,10 +1,11 @@
 /** The piano and the hands as three.js objects, few of them, moved by forward kinematics. */
 
 import {
+  BufferAttribute,
+  BufferGeometry,
   Color,
   DynamicDrawUsage,
   Group,
-  InstancedMesh,
   Matrix4,
   Mesh,
   MeshLambertMaterial,
@@ -52,13 +53,22 @@ interface MovingBody {
   body: number;
 }
 
-/** The parts of one kind that the keys have, such as all visible white keys. */
-interface KeyParts {
-  mesh: InstancedMesh;
+/**
+ * The keys and the lamps behind them, as one mesh whose vertices are moved here: a key has few, and
+ * drawing in software takes as long for each of 176 instances as for a whole mesh.
+ */
+interface Keys {
+  position: BufferAttribute;
+  color: BufferAttribute;
   keys: Int32Array;
+  /** Body that carries each part, or -1 where it stands still. */
   bodies: Int32Array;
-  places: Matrix4[];
+  /** The parts' vertices, each in the frame of its body. */
+  local: Float32Array;
   colors: Color[];
+  /** Vertices of a part. */
+  count: number;
+  lamps: boolean[];
 }
 
 export class PianoScene {
@@ -67,8 +77,7 @@ export class PianoScene {
   readonly floor: number;
 
   private readonly moving: MovingBody[] = [];
-  private readonly parts: KeyParts[] = [];
-  private readonly lamps: KeyParts | null;
+  private readonly keys: Keys;
   private readonly softness = { depth: { value: 0 } };
   private readonly floorShadow = new ShadowMaterial();
   private readonly lit = new Int8Array(KEYS).fill(-1);
@@ -100,18 +109,11 @@ export class PianoScene {
       others.filter((geom) => !isStatic[geom.body]),
       scene,
     );
-    const white = scene.geoms.filter((geom) => geom.key >= 0 && !scene.keys[geom.key]!.black);
-    const black = scene.geoms.filter((geom) => geom.key >= 0 && scene.keys[geom.key]!.black);
-    for (const geoms of [white, black]) {
-      if (geoms.length > 0) {
-        this.parts.push(this.addKeys(geoms, scene, this.material(geoms[0]!, scene, false), true));
-      }
-    }
-    const lamps = scene.geoms.filter((geom) => geom.lamp >= 0);
-    this.lamps =
-      lamps.length > 0
-        ? this.addKeys(lamps, scene, this.material(lamps[0]!, scene, false), false)
-        : null;
+    this.keys = this.addKeys(
+      scene.geoms.filter((geom) => geom.key >= 0 || geom.lamp >= 0),
+      scene,
+      isStatic,
+    );
     this.addFloor();
   }
 
@@ -125,10 +127,7 @@ export class PianoScene {
     this.floorShadow.opacity = look.dark ? 0.45 : 0.22;
     this.softness.depth.value = look.dark ? 0.5 : 0.26;
     this.lit.fill(-1);
-    for (const part of [...this.parts, ...(this.lamps ? [this.lamps] : [])]) {
-      for (let i = 0; i < part.keys.length; i++) part.mesh.setColorAt(i, part.colors[i]!);
-      part.mesh.instanceColor!.needsUpdate = true;
-    }
+    for (let i = 0; i < this.keys.keys.length; i++) this.paint(i, this.keys.colors[i]!);
   }
 
   /** Move all bodies to where forward kinematics has them. */
@@ -136,13 +135,11 @@ export class PianoScene {
     for (const { mesh, body } of this.moving) {
       if (this.moved(kinematics, body)) this.pose(kinematics, body, mesh.matrixWorld);
     }
-    for (const part of this.parts) {
-      for (let i = 0; i < part.keys.length; i++) {
-        if (!this.moved(kinematics, part.bodies[i]!)) continue;
-        this.pose(kinematics, part.bodies[i]!, this.matrix);
-        part.mesh.setMatrixAt(i, this.matrix.multiply(part.places[i]!));
-        part.mesh.instanceMatrix.needsUpdate = true;
-      }
+    const { bodies } = this.keys;
+    for (let i = 0; i < bodies.length; i++) {
+      if (bodies[i]! < 0 || !this.moved(kinematics, bodies[i]!)) continue;
+      this.pose(kinematics, bodies[i]!, this.matrix);
+      this.placeKey(i, this.matrix);
     }
   }
 
@@ -152,22 +149,30 @@ export class PianoScene {
    * @param sounding for each key its `Paint`, or -1 where it is silent.
    */
   light(sounding: ArrayLike<number>): void {
-    for (const part of this.parts) this.paint(part, sounding, LIT);
-    if (this.lamps) this.paint(this.lamps, sounding, 1);
+    const { keys, colors, lamps } = this.keys;
+    for (let i = 0; i < keys.length; i++) {
+      const sound = sounding[keys[i]!]!;
+      if (sound === this.lit[keys[i]!]) continue;
+      this.color.copy(colors[i]!);
+      if (sound >= 0) this.color.lerp(this.paints[sound as Paint]!, lamps[i] ? 1 : LIT);
+      this.paint(i, this.color);
+    }
     for (let key = 0; key < KEYS; key++) this.lit[key] = sounding[key]!;
   }
 
-  private paint(part: KeyParts, sounding: ArrayLike<number>, amount: number): void {
-    for (let i = 0; i < part.keys.length; i++) {
-      const key = part.keys[i]!;
-      if (sounding[key] === this.lit[key]) continue;
-      this.color.copy(part.colors[i]!);
-      if (sounding[key]! >= 0) {
-        this.color.lerp(this.paints[sounding[key] as Paint]!, amount);
-      }
-      part.mesh.setColorAt(i, this.color);
-      part.mesh.instanceColor!.needsUpdate = true;
+  private paint(part: number, paint: Color): void {
+    const { color, count } = this.keys;
+    for (let i = part * count; i < (part + 1) * count; i++) color.setXYZ(i, paint.r, paint.g, paint.b);
+    color.needsUpdate = true;
+  }
+
+  private placeKey(part: number, pose: Matrix4): void {
+    const { position, local, count } = this.keys;
+    for (let i = part * count; i < (part + 1) * count; i++) {
+      this.position.fromArray(local, 3 * i).applyMatrix4(pose);
+      position.setXYZ(i, this.position.x, this.position.y, this.position.z);
     }
+    position.needsUpdate = true;
   }
 
   private addStatic(geoms: Geom[], scene: SceneContent): void {
@@ -175,7 +180,7 @@ export class PianoScene {
       const those = geoms.filter((geom) => geom.material === material);
       // The world's own frame is that of all bodies that never move: the format's piano has no
       // place of its own.
-      const mesh = new Mesh(joined(those, scene), this.material(those[0]!, scene, true));
+      const mesh = new Mesh(joined(those, scene), this.material(those[0]!, scene));
       mesh.castShadow = mesh.receiveShadow = true;
       this.group.add(mesh);
     }
@@ -185,7 +190,7 @@ export class PianoScene {
     const shells = geoms.find((geom) => scene.materials[geom.material]?.name === "shell");
     const first = shells ?? geoms[0];
     if (!first) return;
-    const material = this.material(first, scene, true);
+    const material = this.material(first, scene);
     for (const body of new Set(geoms.map((geom) => geom.body))) {
       const shape = joined(
         geoms.filter((geom) => geom.body === body),
@@ -199,34 +204,37 @@ export class PianoScene {
     }
   }
 
-  private addKeys(
-    geoms: Geom[],
-    scene: SceneContent,
-    material: MeshPhongMaterial | MeshLambertMaterial,
-    shadows: boolean,
-  ): KeyParts {
-    const size = geoms[0]!.size;
-    const mesh = new InstancedMesh(keyShape(size), material, geoms.length);
-    const part: KeyParts = {
-      mesh,
-      keys: Int32Array.from(geoms, (geom) => Math.max(geom.key, geom.lamp)),
-      bodies: Int32Array.from(geoms, (geom) => geom.body),
-      places: geoms.map((geom) =>
-        placeOf(geom).scale(
-          new Vector3(geom.size[0] / size[0], geom.size[1] / size[1], geom.size[2] / size[2]),
-        ),
-      ),
-      colors: geoms.map((geom) => materialColor(geom, scene)),
-    };
-    part.places.forEach((place, i) => {
-      mesh.setMatrixAt(i, place);
-      mesh.setColorAt(i, part.colors[i]!);
+  private addKeys(geoms: Geom[], scene: SceneContent, isStatic: boolean[]): Keys {
+    const shapes = geoms.map((geom) => keyShape(geom.size).applyMatrix4(placeOf(geom)));
+    const count = shapes[0]?.getAttribute("position").count ?? 0;
+    const local = new Float32Array(3 * count * geoms.length);
+    // Keys turn so little that light falls on them as if they did not.
+    const normal = new Float32Array(local.length);
+    shapes.forEach((shape, i) => {
+      local.set(shape.getAttribute("position").array, 3 * count * i);
+      normal.set(shape.getAttribute("normal").array, 3 * count * i);
     });
-    mesh.instanceMatrix.setUsage(DynamicDrawUsage);
-    mesh.castShadow = mesh.receiveShadow = shadows;
+    const position = new BufferAttribute(local.slice(), 3).setUsage(DynamicDrawUsage);
+    const color = new BufferAttribute(new Float32Array(local.length), 3).setUsage(DynamicDrawUsage);
+    const shape = new BufferGeometry()
+      .setAttribute("position", position)
+      .setAttribute("normal", new BufferAttribute(normal, 3))
+      .setAttribute("color", color);
+    const black = geoms.find((geom) => geom.key >= 0 && scene.keys[geom.key]!.black) ?? geoms[0];
+    const mesh = new Mesh(shape, black && this.material(black, scene));
+    mesh.castShadow = mesh.receiveShadow = true;
     mesh.frustumCulled = false;
     this.group.add(mesh);
-    return part;
+    return {
+      position,
+      color,
+      keys: Int32Array.from(geoms, (geom) => Math.max(geom.key, geom.lamp)),
+      bodies: Int32Array.from(geoms, (geom) => (isStatic[geom.body] ? -1 : geom.body)),
+      local,
+      colors: geoms.map((geom) => materialColor(geom, scene)),
+      count,
+      lamps: geoms.map((geom) => geom.lamp >= 0),
+    };
   }
 
   private addFloor(): void {
@@ -249,12 +257,9 @@ export class PianoScene {
     this.group.add(mesh);
   }
 
-  /** The look of a geom's material; its color is that of vertices or of instances. */
-  private material(
-    geom: Geom,
-    scene: SceneContent,
-    vertexColors: boolean,
-  ): MeshPhongMaterial | MeshLambertMaterial {
+  /** The look of a geom's material; its color is that of the vertices. */
+  private material(geom: Geom, scene: SceneContent): MeshPhongMaterial | MeshLambertMaterial {
+    const vertexColors = true;
     if (this.plain) return new MeshLambertMaterial({ vertexColors });
     const material = scene.materials[geom.material];
     const specular = 0.35 * (material?.specular ?? 0);
