@@ -8,7 +8,6 @@ import {
   Group,
   Matrix4,
   Mesh,
-  MeshLambertMaterial,
   MeshPhongMaterial,
   PlaneGeometry,
   Quaternion,
@@ -16,6 +15,7 @@ import {
   ShadowMaterial,
   Vector3,
 } from "three";
+import type { Material } from "three";
 
 import type { Geom, SceneContent } from "./format";
 import { KEYS } from "./format";
@@ -32,19 +32,19 @@ const LIT = 0.9;
 const SOFT_SHADOW: readonly [number, number] = [0.42, 0.95];
 
 const SOFT_VERTEX = /* glsl */ `
-  varying vec2 corner;
+  uniform float depth;
+  varying float dark;
   void main() {
-    corner = 2.0 * uv - 1.0;
+    vec2 near = clamp((1.0 - abs(2.0 * uv - 1.0)) * vec2(1.3, 2.2), 0.0, 1.0);
+    near *= near * (3.0 - 2.0 * near);
+    dark = depth * near.x * near.y;
     gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
   }
 `;
 const SOFT_FRAGMENT = /* glsl */ `
-  uniform float depth;
-  varying vec2 corner;
+  varying float dark;
   void main() {
-    vec2 near = clamp((1.0 - abs(corner)) * vec2(1.3, 2.2), 0.0, 1.0);
-    near *= near * (3.0 - 2.0 * near);
-    gl_FragColor = vec4(0.0, 0.0, 0.0, depth * near.x * near.y);
+    gl_FragColor = vec4(0.0, 0.0, 0.0, dark);
   }
 `;
 
@@ -90,11 +90,11 @@ export class PianoScene {
 
   /**
    * @param scene what there is to be seen.
-   * @param plain whether to leave out what shines, which takes a processor long to draw.
+   * @param plain what all surfaces are made of, where those that shine take too long to draw.
    */
   constructor(
     scene: SceneContent,
-    private readonly plain: boolean,
+    private readonly plain: Material | null,
   ) {
     const isStatic = staticBodies(scene);
     this.lastPose = new Float64Array(7 * scene.bodies.length).fill(NaN);
@@ -239,7 +239,7 @@ export class PianoScene {
 
   private addFloor(): void {
     const soft = new Mesh(
-      new PlaneGeometry(2 * SOFT_SHADOW[0], 2 * SOFT_SHADOW[1]),
+      new PlaneGeometry(2 * SOFT_SHADOW[0], 2 * SOFT_SHADOW[1], 20, 30),
       new ShaderMaterial({
         vertexShader: SOFT_VERTEX,
         fragmentShader: SOFT_FRAGMENT,
@@ -258,13 +258,12 @@ export class PianoScene {
   }
 
   /** The look of a geom's material; its color is that of the vertices. */
-  private material(geom: Geom, scene: SceneContent): MeshPhongMaterial | MeshLambertMaterial {
-    const vertexColors = true;
-    if (this.plain) return new MeshLambertMaterial({ vertexColors });
+  private material(geom: Geom, scene: SceneContent): Material {
+    if (this.plain) return this.plain;
     const material = scene.materials[geom.material];
     const specular = 0.35 * (material?.specular ?? 0);
     return new MeshPhongMaterial({
-      vertexColors,
+      vertexColors: true,
       specular: new Color(specular, specular, specular),
       shininess: 77 * (material?.shininess ?? 0.5),
     });

@@ -525,8 +525,9 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.frames++;
     }
     if (view?.isPrepared && draws) {
-      view.draw(true);
+      // Before drawing, since another number of pixels empties the canvas.
       view.watchSpeed(passed);
+      view.draw(true);
       view.rig.still = false;
       this.drawnAt = now;
     } else if (view?.isPrepared && now - this.drawnAt > REST && view.rest()) {

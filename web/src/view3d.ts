@@ -8,6 +8,7 @@ import {
   Scene,
   WebGLRenderer,
 } from "three";
+import type { ShaderMaterial } from "three";
 
 import { Badges } from "./badges";
 import { CameraRig } from "./cameras";
@@ -19,6 +20,7 @@ import { Kinematics } from "./kinematics";
 import type { Look, Paint } from "./look";
 import { handPaint, heardPaint, isMissed } from "./look";
 import { PianoScene } from "./piano_scene";
+import { lightPlain, plainMaterial } from "./plain_material";
 import type { ReplayData } from "./replay_data";
 
 /** What is drawn, from the best to the quickest: pixels for each of the page's, and shadows. */
@@ -70,7 +72,7 @@ export class View3D {
   /** Whether all shaders are made, so that drawing keeps nobody waiting. */
   isPrepared = false;
   private readonly renderer: WebGLRenderer;
-  private readonly software: boolean;
+  private readonly plain: ShaderMaterial | null;
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera();
   private readonly piano: PianoScene;
@@ -99,18 +101,18 @@ export class View3D {
     positions: number,
   ) {
     this.renderer = drawing.renderer;
-    this.software = drawing.software;
+    this.plain = drawing.software ? plainMaterial() : null;
     this.pose = new Float64Array(positions);
     this.tips = new Float64Array(3 * content.fingertips.length);
     this.kinematics = new Kinematics(content.bodies);
-    this.piano = new PianoScene(content, drawing.software);
+    this.piano = new PianoScene(content, this.plain);
     this.falling = new FallingNotes(content, this.signs);
     this.badges = new Badges(this.signs);
     this.rig = new CameraRig(this.camera, content);
     this.wristBodies = [wristOf(content, 0), wristOf(content, 1)];
     this.scene.add(this.piano.group, this.falling.mesh, this.badges.mesh, this.sky);
     this.addLights();
-    this.quality = this.software ? SOFTWARE : 0;
+    this.quality = this.plain ? SOFTWARE : 0;
     this.applyQuality();
     this.rig.show("player", this.wrists, true);
   }
@@ -129,6 +131,10 @@ export class View3D {
     this.falling.setLook(look);
     this.badges.setLook(look);
     this.sky.intensity = look.dark ? 0.95 : 1.35;
+    if (this.plain) {
+      const towards = this.sun.position.clone().sub(this.sun.target.position);
+      lightPlain(this.plain, towards, this.sun.intensity, this.sky.intensity);
+    }
   }
 
   show(name: Parameters<CameraRig["show"]>[0], shown: Shown): void {
@@ -243,9 +249,10 @@ export class View3D {
     shadow.bias = -0.0004;
     shadow.normalBias = 0.0015;
     shadow.radius = 3;
+    this.sky.position.set(0, 0, 1);
     this.fill.position.set(pos[0], -pos[1], 0.6 * pos[2]);
     this.scene.add(this.sun, this.sun.target);
-    if (!this.software) this.scene.add(this.fill);
+    if (!this.plain) this.scene.add(this.fill);
   }
 
   private lightKeys(data: ReplayData, time: number): void {
