@@ -120,28 +120,28 @@ export function placeOf(geom: Geom): Matrix4 {
 
 /** Join the shapes of geoms into one, with the colours of their materials. */
 export function joined(geoms: readonly Geom[], scene: SceneContent): BufferGeometry {
-  const parts = geoms.map((geom) => {
-    const indexed = shapeOf(geom, scene).applyMatrix4(placeOf(geom));
-    return { shape: indexed.index ? indexed.toNonIndexed() : indexed, geom };
-  });
-  let count = 0;
-  for (const { shape } of parts) count += shape.getAttribute("position").count;
+  const shapes = geoms.map((geom) => shapeOf(geom, scene).applyMatrix4(placeOf(geom)));
+  const count = shapes.reduce((sum, shape) => sum + shape.getAttribute("position").count, 0);
   const position = new Float32Array(3 * count);
   const normal = new Float32Array(3 * count);
   const color = new Float32Array(3 * count);
+  const corners: number[] = [];
   let from = 0;
-  for (const { shape, geom } of parts) {
+  shapes.forEach((shape, place) => {
     const vertices = shape.getAttribute("position");
     position.set(vertices.array, 3 * from);
     normal.set(shape.getAttribute("normal").array, 3 * from);
-    const paint = materialColor(geom, scene);
+    const paint = materialColor(geoms[place]!, scene);
     for (let i = 0; i < vertices.count; i++) paint.toArray(color, 3 * (from + i));
+    const length = shape.index?.count ?? vertices.count;
+    for (let i = 0; i < length; i++) corners.push(from + (shape.index?.getX(i) ?? i));
     from += vertices.count;
-  }
+  });
   return new BufferGeometry()
     .setAttribute("position", new BufferAttribute(position, 3))
     .setAttribute("normal", new BufferAttribute(normal, 3))
-    .setAttribute("color", new BufferAttribute(color, 3));
+    .setAttribute("color", new BufferAttribute(color, 3))
+    .setIndex(corners);
 }
 
 /** The color of a geom's material. Colors in a scene are meant as a screen shows them. */
