@@ -76,7 +76,10 @@ class Page(HTMLParser):
         self.feed(html)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.sources += [value or "" for name, value in attrs if name in ("src", "srcset", "href")]
+        if tag != "link":
+            self.sources += [
+                value or "" for name, value in attrs if name in ("src", "srcset", "href")
+            ]
 
 
 def test_a_report_is_complete_and_its_page_needs_nothing_else(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ _PAGE = Template("""\
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>$title</title>
+<link rel="icon" href="data:,">
 <style>
 :root { $light }
 @media (prefers-color-scheme: dark) {

@@ -55,7 +55,8 @@ export class ReplayElement extends HTMLElement implements Showing {
   private data = new ReplayData();
   private readonly ownClock = new Clock(new Audio());
   private clock = this.ownClock;
-  private soundName: SoundName = "played";
+  /** What the user wants to hear; where that is not there, it is the first that is. */
+  private wish: SoundName = "played";
   private playsSound: string | null = null;
   private readonly shown: Shown = { falling: true, numbers: true };
   private faults: Fault[] = [];
@@ -454,14 +455,17 @@ export class ReplayElement extends HTMLElement implements Showing {
   }
 
   private takeSound(): void {
-    const { sounds } = this;
-    if (!sounds.includes(this.soundName)) this.soundName = sounds[0]!;
     const address = this.soundName === "wanted" ? this.wanted : (this.sound ?? this.wanted);
     if (address !== this.playsSound) {
       this.playsSound = address;
       this.ownClock.setSound(address);
     }
     (this.ownClock.sound as HTMLAudioElement).muted = this.soundName === "none";
+  }
+
+  private get soundName(): SoundName {
+    const { sounds, wish } = this;
+    return sounds.includes(wish) ? wish : sounds[0]!;
   }
 
   private get sounds(): SoundName[] {
@@ -612,11 +616,11 @@ export class ReplayElement extends HTMLElement implements Showing {
         this.clock.rate = rate;
       },
       setSound: (sound) => {
-        this.soundName = sound;
+        this.wish = sound;
         this.takeSound();
       },
       mute: () => {
-        this.soundName = this.soundName === "none" ? this.sounds[0]! : "none";
+        this.wish = this.soundName === "none" ? this.sounds[0]! : "none";
         this.takeSound();
       },
       toggleLoop: () => {
