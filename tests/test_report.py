@@ -314,7 +314,7 @@ def test_mp3_that_is_heard_while_it_comes_is_in_time() -> None:
             file.add(sound[second * rate :][:rate])
             sizes.append(len(wire.getvalue()))
     # What was encoded is there at once.
-    assert np.diff(sizes).min() > 0.9 * 128_000 / 8
+    assert np.diff(sizes).min() > 0.9 * 320_000 / 8
     with av.open(io.BytesIO(wire.getvalue())) as opened:
         level = np.abs(np.hstack([part.to_ndarray() for part in opened.decode(audio=0)])[0])
     for click in clicks:

@@ -123,10 +123,12 @@ class Worker:
     Args:
         function: what loads what answers, as "package.module:function".
         setup: what the function is given, for JSON.
+        threads: for linear algebra; where there is a process for each core, more than one would
+            only get in each other's way.
     """
 
-    def __init__(self, function: str, setup: Any = None) -> None:
-        self._function, self._setup = function, json.dumps(setup)
+    def __init__(self, function: str, setup: Any = None, threads: int = 1) -> None:
+        self._function, self._setup, self._threads = function, json.dumps(setup), threads
         # One thread may wait for a row in `ask` while another calls `close`.
         self._lock = threading.Lock()
         self._closed = False
@@ -183,9 +185,8 @@ class Worker:
                 **os.environ,
                 # What can be imported here can be imported there.
                 "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),
-                # One item a core: more threads in each would only get in each other's way.
-                "OMP_NUM_THREADS": "1",
-                "OPENBLAS_NUM_THREADS": "1",
+                "OMP_NUM_THREADS": str(self._threads),
+                "OPENBLAS_NUM_THREADS": str(self._threads),
             },
             # Ctrl-C is for the process that asked, which then ends this one.
             start_new_session=True,

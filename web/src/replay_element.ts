@@ -451,7 +451,8 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.overlay.setMessage(data.failure);
       this.settle?.reject(new Error(data.failure));
     }
-    this.isStale = true;
+    // How far the planning is changes nothing in the picture.
+    if (block.tag !== "PLAN") this.isStale = true;
   }
 
   private takeSound(): void {

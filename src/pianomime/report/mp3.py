@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _BITS_PER_SECOND = 128_000
+_LIVE_BITS_PER_SECOND = 320_000
+"""A browser begins when it has 32 kB, which so are less than a second."""
 _DELAY = 1105
 """Samples by which a decoder is late that is not told the encoder's delay."""
 
@@ -39,7 +41,7 @@ class Mp3:
         self._stream: Any = self._file.add_stream(
             "libmp3lame", rate=sample_rate, layout="stereo", options={"compression_level": "7"}
         )
-        self._stream.bit_rate = _BITS_PER_SECOND
+        self._stream.bit_rate = _LIVE_BITS_PER_SECOND if live else _BITS_PER_SECOND
         self._rate, self._done = sample_rate, 0
         # So that what is heard is in time; at the beginning of music nothing sounds.
         self._left_out = _DELAY if live else 0

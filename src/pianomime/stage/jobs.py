@@ -13,7 +13,7 @@ from typing import Any
 
 from pianomime.replay.blocks import json_block
 from pianomime.stage.playing import REPLAY, SOUND, WORKER
-from pianomime.workers import Row, Worker
+from pianomime.workers import Row, Worker, cores
 
 _CHUNK = 1 << 18
 _POLL_SECONDS = 0.03
@@ -126,7 +126,7 @@ class Jobs:
     def __init__(self, folder: Path, out: Path) -> None:
         self._folder, self._setup = folder, {"out": os.fspath(out)}
         self._jobs: dict[str, Job] = {}
-        self._waiting = Worker(WORKER, self._setup)
+        self._waiting = self._worker()
 
     def start(self, page: str, request: dict[str, Any]) -> Job:
         """Begin a job; the one that this page had before is stopped.
@@ -145,10 +145,13 @@ class Jobs:
         folder = self._folder / number
         folder.mkdir()
         job = Job(number, page, folder, request, self._waiting)
-        self._waiting = Worker(WORKER, self._setup)
+        self._waiting = self._worker()
         self._jobs[number] = job
         job.start()
         return job
+
+    def _worker(self) -> Worker:
+        return Worker(WORKER, self._setup, threads=cores())
 
     def get(self, number: str) -> Job | None:
         """The job of a number, or None."""

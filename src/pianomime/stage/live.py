@@ -33,8 +33,9 @@ from pianomime.world.touch import TOUCHES
 
 _BATCH_FRAMES = 10
 """Frames that are written together."""
-_SOUND_FRAMES = round(FRAME_RATE)
-"""Frames whose sound is made together."""
+_FIRST_SOUND_FRAMES, _MOST_SOUND_FRAMES = 10, 80
+"""Frames whose sound is made together: few at first, so that something is heard soon, then more,
+for each part is made with the ten seconds before it."""
 _TOLD_SECONDS = 0.1
 """[s] At most so often the page is told how far the planning is."""
 _MEASURED_SECONDS = 10.0
@@ -63,6 +64,7 @@ class LiveReplay:
         self._notes, self._pedal = SoundingNotes(), score.pedal
         self._poses: list[NDArray[np.float64]] = [np.zeros(LAYOUT.qpos_size)]
         self._written, self._substeps, self._frames = 0, 0, 0
+        self._sounded, self._sound_due = 0, _FIRST_SOUND_FRAMES
         self._heard = np.empty((0, 3))
         self._gain: float | None = None
         self._told = -np.inf
@@ -102,7 +104,7 @@ class LiveReplay:
         self._pedalled.append(step.pedal)
         self._frames += 1
         last = self._frames == self._score.frames()
-        if self._frames % _SOUND_FRAMES == 0 or last:
+        if self._frames == self._sound_due or last:
             self._write_sound()
         if self._frames % _BATCH_FRAMES == 0 or last:
             self._write_motion()
@@ -134,14 +136,15 @@ class LiveReplay:
             self._write(pedal_block(played.pedal))
 
     def _write_sound(self) -> None:
-        begin = (self._frames - 1) // _SOUND_FRAMES * _SOUND_FRAMES * FRAME_SECONDS
-        now = self._frames * FRAME_SECONDS
+        begin, now = self._sounded * FRAME_SECONDS, self._frames * FRAME_SECONDS
         # A note that still sounds ends later than this stretch.
         played = self._played(now, now + _RINGING)
         if self._gain is None:
             self._gain = _gain(self._score)
         made = self._gain * live_sound(played, begin, now - begin)
         self._sound.add(np.clip(made, -1.0, 1.0))
+        self._sound_due += min(self._frames, _MOST_SOUND_FRAMES)
+        self._sounded = self._frames
 
     def _played(self, now: float, sounding_until: float | None = None) -> Score:
         """What sounded so far; notes that still sound end at the time given, else now."""
