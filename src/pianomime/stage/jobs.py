@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import secrets
+import shutil
 import threading
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -17,6 +18,8 @@ from pianomime.workers import Row, Worker, cores
 
 _CHUNK = 1 << 18
 _POLL_SECONDS = 0.03
+_MOST_DONE = 16
+"""Jobs that have ended whose files are kept for pages that still show them."""
 _GRACE_SECONDS = 4.0
 """[s] A page that reads no more was closed, if it does not come back within this time."""
 _START_SECONDS = 20.0
@@ -141,6 +144,10 @@ class Jobs:
         for job in self._jobs.values():
             if job.page == page:
                 job.stop()
+        ended = [job for job in self._jobs.values() if job.done]
+        for job in ended[:-_MOST_DONE]:
+            del self._jobs[job.number]
+            shutil.rmtree(job.folder, ignore_errors=True)
         number = secrets.token_hex(8)
         folder = self._folder / number
         folder.mkdir()

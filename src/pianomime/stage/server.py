@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 from collections.abc import AsyncIterator, Sequence
@@ -79,15 +80,14 @@ class _Handler(LocalHandler):
     async def send(self, parts: AsyncIterator[bytes]) -> None:
         """Answer with what comes, as it comes, until the page closes."""
         try:
-            async for part in parts:
-                self.write(part)
-                await self.flush()
-        except StreamClosedError:
-            pass
+            with contextlib.suppress(StreamClosedError):
+                async for part in parts:
+                    self.write(part)
+                    await self.flush()
         finally:
             await parts.aclose()  # type: ignore[attr-defined]
 
-    def send_file(self, path: Path, kind: str) -> None:
+    async def send_file(self, path: Path, kind: str) -> None:
         """Answer with a file, or with the part of it that is asked for."""
         self.set_header("Content-Type", kind)
         self.set_header("Accept-Ranges", "bytes")
@@ -96,9 +96,12 @@ class _Handler(LocalHandler):
         if (first, stop) != (0, size):
             self.set_status(206)
             self.set_header("Content-Range", f"bytes {first}-{stop - 1}/{size}")
-        with path.open("rb") as file:
+        self.set_header("Content-Length", str(stop - first))
+        with contextlib.suppress(StreamClosedError), path.open("rb") as file:
             file.seek(first)
-            self.finish(file.read(stop - first))
+            while part := file.read(min(_CHUNK, stop - file.tell())):
+                self.write(part)
+                await self.flush()
 
 
 class _Listed(_Handler):
@@ -184,14 +187,14 @@ class _Sound(_Handler):
             self.set_header("Content-Type", "audio/mpeg")
             await self.send(job.sound())
         else:
-            self.send_sound(job, "performance.mp3")
+            await self.send_sound(job, "performance.mp3")
 
-    def send_sound(self, job: Job, name: str) -> None:
+    async def send_sound(self, job: Job, name: str) -> None:
         """Answer with a sound of the report of a job that is done."""
         if job.report is None:
             self.refuse(404, "It is not there yet.")
         else:
-            self.send_file(job.report / name, "audio/mpeg")
+            await self.send_file(job.report / name, "audio/mpeg")
 
 
 class _Wanted(_Sound):
@@ -199,13 +202,13 @@ class _Wanted(_Sound):
 
     async def get(self, number: str) -> None:
         if (job := self.job(number)) is not None:
-            self.send_sound(job, "score.mp3")
+            await self.send_sound(job, "score.mp3")
 
 
 class _Files(_Handler):
     """Sends files of a report."""
 
-    def get(self, number: str, name: str) -> None:
+    async def get(self, number: str, name: str) -> None:
         job = self.job(number)
         if job is None:
             return
@@ -221,7 +224,7 @@ class _Files(_Handler):
             )
         else:
             self.set_header("Content-Disposition", f'attachment; filename="{name}"')
-        self.send_file(job.report / name, _KINDS[name])
+        await self.send_file(job.report / name, _KINDS[name])
 
 
 class Stage:
