@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -165,8 +167,8 @@ def test_frames_in_which_the_physics_broke_are_recorded(monkeypatch: pytest.Monk
     class Fragile(World):
         steps = 0
 
-        def step(self, ctrl: np.ndarray, pedal: bool = False, parts: int = 1) -> None:
-            super().step(ctrl, pedal, parts=parts)
+        def step(self, ctrl: np.ndarray, pedal: bool = False, **more: Any) -> None:
+            super().step(ctrl, pedal, **more)
             Fragile.steps += 1
             if Fragile.steps in (3, 4, 8):
                 self.blow_ups += 1

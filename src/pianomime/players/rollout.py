@@ -53,7 +53,7 @@ def rollout(
         for part in range(parts):
             sent.append(controller.control(frame * parts + part, world))
             down = bool(pedal[frame]) if pedalling is None else pedalling.pedal(frame)
-            world.step(sent[-1], down, watch, parts)
+            world.step(sent[-1], down, watch=watch, parts=parts)
             events = events.followed_by(world.key_events.later(part * FRAME_SECONDS / parts))
         ctrl = sent[0] if parts == 1 else np.array(sent)
         yield Step(frame, ctrl, down, events)

@@ -15,6 +15,7 @@ from pianomime.music import Score, match_notes
 from pianomime.plan import FingertipPlan
 from pianomime.players.performance import Performance
 from pianomime.replay.blocks import json_block
+from pianomime.short_repr import count, short_repr
 
 _NOBODY = -1
 _MILLISECONDS = 4
@@ -38,6 +39,13 @@ class Judgement:
     heard_hand: list[int]
     heard_finger: list[int]
     heard_cause: list[str | None]
+
+    def __repr__(self) -> str:
+        return short_repr(
+            self,
+            f"{int(self.played.sum())} of {count(len(self.played), 'note')} played",
+            f"{int((~self.right).sum())} wrong",
+        )
 
     @classmethod
     def of(cls, performance: Performance) -> Judgement:
@@ -114,17 +122,17 @@ def heard_block(heard: Score, first: int = 0, judgement: Judgement | None = None
         first: replaces what was known from this one on.
         judgement: what became of them, and who struck them; None while that is not known.
     """
-    count = len(heard)
+    strikes = len(heard)
     columns: dict[str, Any] = {
         "from": first,
         "key": heard.key.tolist(),
         "on": _seconds(heard.onset),
         "off": _seconds(heard.offset),
         "velocity": heard.velocity.tolist(),
-        "hand": [_NOBODY] * count,
-        "finger": [_NOBODY] * count,
-        "verdict": [None] * count,
-        "cause": [None] * count,
+        "hand": [_NOBODY] * strikes,
+        "finger": [_NOBODY] * strikes,
+        "verdict": [None] * strikes,
+        "cause": [None] * strikes,
     }
     if judgement is not None:
         columns |= {

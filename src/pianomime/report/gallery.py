@@ -40,7 +40,7 @@ _SAVED_BY_PLAY = "performance"
 _SHOWN = MUSIC[0], MUSIC[1], MUSIC[4], MUSIC[5]
 """Measures on every card; the others are shown when they are sorted by."""
 _SORTED_BY = tuple(measure for measure in (*MUSIC, *FRAMES, *MORE_MUSIC, *BODY))
-_ROLL = 320, 88
+_ROLL = 320, KEYS
 """Width and height of the piano roll on a card, in its own units."""
 
 _STYLE = """\

@@ -22,7 +22,7 @@ _MOST_DONE = 16
 """Jobs that have ended whose files are kept for pages that still show them."""
 _GRACE_SECONDS = 4.0
 """[s] A page that reads no more was closed, if it does not come back within this time."""
-_START_SECONDS = 20.0
+_START_SECONDS = 15.0
 """[s] A page that has asked for a job begins to read within this time."""
 
 
