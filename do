@@ -168,7 +168,7 @@ def main():
     use_new_enough_python()
     command, rest = (sys.argv[1:2] or ["--help"])[0], sys.argv[2:]
     if command == "play":
-        set_up("")
+        set_up("stage")
         build_page()
         # Options alone still play the default song.
         song = [] if rest and not rest[0].startswith("-") else [DEFAULT_SONG]
@@ -189,7 +189,7 @@ def main():
                 codes.append(subprocess.call(npm + ["run", "--silent", check], cwd=WEB))
         sys.exit(max(codes))
     elif command == "page":
-        set_up("")
+        set_up("stage")
         sys.exit(0 if build_page() else 2)
     elif command == "docs" and rest in ([], ["serve"]):
         set_up("docs")
@@ -203,7 +203,9 @@ def main():
             run(zensical + ["serve"])
         sys.exit(build_docs(zensical + ["build", "--clean", "--strict"]))
     elif command == "run" and rest:
-        set_up("")
+        set_up("stage")
+        if rest[:2] == ["pianomime", "stage"]:
+            build_page()
         os.environ["PATH"] = BIN + os.pathsep + os.environ["PATH"]
         run(rest)
     elif command in ("-h", "--help", "help"):
