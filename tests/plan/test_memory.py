@@ -13,7 +13,8 @@ from pianomime.plan.joint_path import PathConfig
 
 
 def test_a_minute_more_of_hand_paths_takes_little_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pianomime.plan.joint_path._WINDOW", 100)
+    for name in ("_WINDOW", "_SOLVED"):
+        monkeypatch.setattr(f"pianomime.plan.joint_path.{name}", 100)
     config = HandPathConfig(PathConfig(iterations=2))
     peaks = []
     frames = 400, 1600

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from pianomime.world import World
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
-from pianomime.world.model import SIDES
+from pianomime.world.model import SIDES, Side
+from pianomime.world_names import WORLDS
 
 TX = 0  # The joint along the keyboard.
 HANDS = {side: Hand(side) for side in SIDES}
@@ -65,6 +66,22 @@ def test_jacobian_is_the_slope_of_the_points(side: str, share: NDArray[np.float6
         axis=-1,
     )
     np.testing.assert_allclose(jacobian, slopes, atol=1e-7)
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("side", SIDES)
+def test_many_poses_are_as_each_alone_bit_for_bit(side: Side, world: str) -> None:
+    hand = Hand(side, world)
+    shares = np.random.default_rng(0).random((40, LAYOUT.hand_joints))
+    path = hand.low + shares * (hand.high - hand.low)
+    points, jacobians = hand.points_and_jacobians(path)
+    np.testing.assert_array_equal(points, hand.points_along(path))
+    for row, alone in enumerate(path):
+        point, jacobian = hand.points_and_jacobian(alone)
+        np.testing.assert_array_equal(points[row], point)
+        np.testing.assert_array_equal(jacobians[row], jacobian)
+    nothing = hand.points_and_jacobians(path[:0])
+    assert [array.shape for array in nothing] == [(0, 6, 3), (0, 6, 3, LAYOUT.hand_joints)]
 
 
 @pytest.mark.parametrize("side", SIDES)

@@ -254,8 +254,7 @@ class _Scene:
         tips = np.empty((len(performance), 2, FINGER_COUNT, 3))
         for index, side in enumerate(SIDES):
             hand = Hand(side)
-            for frame, qpos in enumerate(performance.qpos):
-                tips[frame, index] = hand.points(qpos[hand.joints])[1:]
+            tips[:, index] = hand.points_along(performance.qpos[:, hand.joints])[:, 1:]
         broken = np.zeros(len(performance), bool)
         for frame in performance.blow_ups:
             broken[frame : frame + _AFTERMATH] = True

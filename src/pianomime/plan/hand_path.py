@@ -93,8 +93,7 @@ def hand_paths(
         problems.append(PathProblem(Hand(side), start, targets, weights, clearance, config.path))
     fingertips = np.empty((len(finger_key), 2, POINT_COUNT, 3))
     for index, path in enumerate(smooth_paths(problems, steps.advance)):
-        for frame, pose in enumerate(path[1:]):
-            fingertips[frame, index] = problems[index].hand.points(pose)
+        fingertips[:, index] = problems[index].hand.points_along(path[1:])
         fingertips[:, index, 1:, 2][finger_key[:, index] >= 0] = 0.0
     return fingertips
 

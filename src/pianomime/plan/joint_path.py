@@ -54,6 +54,8 @@ _HELD = 1e9
 
 _WINDOW = 1000
 """Frames whose matrices are in memory as a whole; excerpts of less than 50 s fit in one window."""
+_SOLVED = 4000
+"""Frames that are solved at once; what does not fit is factored twice, see `band_solve`."""
 _TRIANGLE = [
     np.arange(LAYOUT.hand_joints - below) * (LAYOUT.hand_joints + 1) + below * LAYOUT.hand_joints
     for below in range(LAYOUT.hand_joints)
@@ -241,10 +243,7 @@ def _tracking_terms(
     config: PathConfig,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Hessian (T, 27, 27) and gradient (T, 27) of the squared errors of the points of a hand."""
-    points = np.empty(targets.shape)
-    jacobian = np.empty((*targets.shape, LAYOUT.hand_joints))
-    for frame, pose in enumerate(path):
-        points[frame], jacobian[frame] = hand.points_and_jacobian(pose)
+    points, jacobian = hand.points_and_jacobians(path)
     error = (points - targets) * weights
     rows = jacobian * weights[..., None]
     height = points[:, 1:, 2] - clearance - resting_height(points[:, 1:, 0])
@@ -253,12 +252,8 @@ def _tracking_terms(
     rows[:, 1:, 2][below] = jacobian[:, 1:, 2][below] / config.floor
     rows = rows.reshape(len(path), -1, LAYOUT.hand_joints)
     error = error.reshape(len(path), -1)
-    gradient = np.empty((len(path), LAYOUT.hand_joints))
-    blocks = np.empty((len(path), LAYOUT.hand_joints, LAYOUT.hand_joints))
-    for frame, row in enumerate(rows):
-        blocks[frame] = row.T @ row
-        gradient[frame] = row.T @ error[frame]
-    return blocks, gradient
+    columns = rows.swapaxes(1, 2)
+    return columns @ rows, (columns @ error[..., None])[..., 0]
 
 
 def resting_height(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -359,5 +354,5 @@ def _step(
             band[:, :, lag * LAYOUT.hand_joints] += ties[lag] * stiffness
         return band.reshape(-1, _BANDS + 1)
 
-    step = solve_in_windows(columns, -gradient.ravel(), _BANDS, _WINDOW * LAYOUT.hand_joints)
+    step = solve_in_windows(columns, -gradient.ravel(), _BANDS, _SOLVED * LAYOUT.hand_joints)
     return step.reshape(frames, LAYOUT.hand_joints)

@@ -27,7 +27,7 @@ from pianomime.track.finger_feedback import lift_joints, reach_joints, shared
 from pianomime.validation import finite
 from pianomime.world import World
 from pianomime.world.hand import Hand
-from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
+from pianomime.world.layout import LAYOUT, POINT_COUNT
 from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
 from pianomime.world_names import PAPER
@@ -114,10 +114,7 @@ class DynamicController:
             problem = PathProblem(hand, start, targets, weights, clearance, config.path)
             path = smooth_path(problem, steps.advance)
             self._paths.append(path)
-            tips = np.empty((len(path), FINGER_COUNT, 3))
-            for frame, pose in enumerate(path):
-                tips[frame] = hand.points(pose)[1:]
-            self._tips.append(tips)
+            self._tips.append(hand.points_along(path)[:, 1:])
             steps.advance(len(plan))
             torque = motion_torque(hand, path)
             steps.advance(len(plan))
@@ -259,9 +256,9 @@ def press_torque(
 ) -> NDArray[np.float64]:
     """(T, 5, 27) [N m, N] torque with which each pressing fingertip (T, 5) pushes down 1 N."""
     torque = np.zeros((*pressing.shape, path.shape[1]))
-    for frame in np.flatnonzero(pressing.any(axis=1)):
-        _, jacobian = hand.points_and_jacobian(path[frame])
-        torque[frame][pressing[frame]] = -jacobian[1:, 2][pressing[frame]]
+    busy = pressing.any(axis=1)
+    _, jacobian = hand.points_and_jacobians(path[busy])
+    torque[busy] = np.where(pressing[busy, :, None], -jacobian[:, 1:, 2], 0.0)
     return torque
 
 

@@ -301,12 +301,10 @@ class KeystrokeController:
         """Note where the fingertips of a path are, and what presses as hard as strokes are."""
         to_control = np.linalg.pinv(hand.to_ctrl) / hand.gain
         force = self._strokes.force[:, index]
-        for step, pose in enumerate(path):
-            pushing = np.flatnonzero(force[step - 1]) if step else ()
-            if not len(pushing):
-                self._tips[index, step] = hand.points(pose)[1:]
-                continue
-            points, jacobian = hand.points_and_jacobian(pose)
-            self._tips[index, step] = points[1:]
-            push = -force[step - 1, pushing, None] * jacobian[1:, 2][pushing]
-            self._press[step - 1, index, pushing] = push @ to_control
+        self._tips[index] = hand.points_along(path)[:, 1:]
+        busy = np.flatnonzero(force.any(axis=1))
+        _, jacobian = hand.points_and_jacobians(path[1:][busy])
+        for step, down in zip(busy, jacobian[:, 1:, 2], strict=True):
+            pushing = np.flatnonzero(force[step])
+            push = -force[step, pushing, None] * down[pushing]
+            self._press[step, index, pushing] = push @ to_control

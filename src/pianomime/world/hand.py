@@ -45,6 +45,9 @@ class Hand:
         self.joints = LAYOUT.joints[SIDES.index(side)]
         self.actuators = LAYOUT.actuators[SIDES.index(side)]
         self._sites = [self.model.site(name).id for name in fingertip_sites(side)]
+        bodies = self.model.site_bodyid[self._sites]
+        self._root = int(self.model.body_rootid[bodies[0]])
+        self._fixed = ~np.array([self._moves(int(body)) for body in bodies])
 
     def points(self, qpos: NDArray[np.float64]) -> NDArray[np.float64]:
         """World positions of wrist and fingertips.
@@ -78,6 +81,65 @@ class Hand:
             mujoco.mj_jacSite(self.model, self.data, jacobian[row], None, site)
         return points, jacobian
 
+    def points_along(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The points, as `points` returns them, in many poses.
+
+        Args:
+            path: (T, 27) joint positions [rad, m].
+
+        Returns:
+            (T, 6, 3) wrist, then fingertips, thumb first [m].
+        """
+        points = np.empty((len(path), *self.data.site_xpos.shape))
+        for row, pose in enumerate(path):
+            self.data.qpos[:] = pose
+            mujoco.mj_kinematics(self.model, self.data)
+            points[row] = self.data.site_xpos
+        return points[:, self._sites]
+
+    def points_and_jacobians(
+        self, path: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The points and their Jacobians, bit for bit as `points_and_jacobian`, in many poses.
+
+        Args:
+            path: (T, 27) joint positions [rad, m].
+
+        Returns:
+            (T, 6, 3) points [m] and (T, 6, 3, 27) Jacobians [m/rad, 1].
+        """
+        data = self.data
+        points = np.empty((len(path), *data.site_xpos.shape))
+        axes = np.empty((len(path), *data.cdof.shape))
+        centre = np.empty((len(path), 3))
+        for row, pose in enumerate(path):
+            data.qpos[:] = pose
+            mujoco.mj_kinematics(self.model, data)
+            mujoco.mj_comPos(self.model, data)
+            points[row], axes[row] = data.site_xpos, data.cdof
+            centre[row] = data.subtree_com[self._root]
+        points = points[:, self._sites]
+        # MuJoCo gives the motion about each joint as a turn, and a velocity at the hand's centre of
+        # mass; what `mj_jacSite` computes of them for one frame is computed for all.
+        arm = (points - centre[:, None])[..., None]
+        turn, slide = axes[:, None, :, :3], axes[:, None, :, 3:]
+        jacobian = np.empty((*points.shape, LAYOUT.hand_joints))
+        for axis in range(3):
+            one, other = (axis + 1) % 3, (axis + 2) % 3
+            across = turn[..., one] * arm[:, :, other] - turn[..., other] * arm[:, :, one]
+            np.add(slide[..., axis], across, out=jacobian[:, :, axis])
+        jacobian.swapaxes(2, 3)[:, self._fixed] = 0.0
+        return points, jacobian
+
+    def _moves(self, body: int) -> NDArray[np.bool_]:
+        """(27,) Which joints move a body."""
+        moves = np.zeros(LAYOUT.hand_joints, bool)
+        while body:
+            first, count = self.model.body_jntadr[body], self.model.body_jntnum[body]
+            moves[first : first + count] = True
+            body = int(self.model.body_parentid[body])
+        return moves
+
     def _transmission(self) -> NDArray[np.float64]:
         mujoco.mj_forward(self.model, self.data)
         moment = np.zeros((LAYOUT.hand_actuators, LAYOUT.hand_joints))
@@ -109,8 +171,7 @@ def hand_points(joints: NDArray[np.floating]) -> NDArray[np.float64]:
     """
     points = np.empty((len(joints), 2, POINT_COUNT, 3))
     for index, hand in enumerate(both_hands()):
-        for row, pose in enumerate(joints[:, LAYOUT.among_hands(index)]):
-            points[row, index] = hand.points(pose)
+        points[:, index] = hand.points_along(joints[:, LAYOUT.among_hands(index)])
     return points
 
 
