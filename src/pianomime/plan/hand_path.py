@@ -61,12 +61,10 @@ class HandPathConfig:
             above_zero(name, getattr(self, name))
 
 
-def hand_paths(
-    finger_key: NDArray[np.int8],
-    config: HandPathConfig | None = None,
-    others: NDArray[np.floating] | None = None,
-) -> NDArray[np.float64]:
+class HandPaths:
     """Points of both hands that move smoothly from rest and press the given keys.
+
+    They are planned from the first frame on, all at once or some frames at a time.
 
     Args:
         finger_key: (T, 2, 5) key that each finger presses, -1 for none.
@@ -74,28 +72,70 @@ def hand_paths(
         others: (T, 2, 6, 3) points of other hands, such as a human's, that wrists and idle
             fingers stay near, world frame [m]; None for no such preference.
 
-    Returns:
-        (T, 2, 6, 3) points, world frame [m]; z is 0 for fingers that press.
+    Attributes:
+        fingertips: (T, 2, 6, 3) points, world frame [m]; z is 0 for fingers that press. Hands are
+            at rest in frames that are not planned yet.
+        planned: number of frames that are.
     """
-    config = config or HandPathConfig()
-    steps = Steps("hand paths", len(SIDES) * config.path.iterations * len(finger_key))
-    problems = []
-    for index, side in enumerate(SIDES):
-        targets, weights, clearance = _targets(finger_key[:, index], config)
-        if others is not None:
-            idle = (weights == 0).all(axis=2)
-            idle[:, 0] = False
-            targets[idle, :2] = others[:, index][idle, :2]
-            weights[idle, :2] = 1 / config.alike
-            targets[:, 0] = others[:, index, 0]
-            weights[:, 0, 1] = 1 / config.alike_wrist
-        start = np.zeros(LAYOUT.hand_joints)
-        problems.append(PathProblem(Hand(side), start, targets, weights, clearance, config.path))
-    fingertips = np.empty((len(finger_key), 2, POINT_COUNT, 3))
-    for index, path in enumerate(smooth_paths(problems, steps.advance)):
-        fingertips[:, index] = problems[index].hand.points_along(path[1:])
-        fingertips[:, index, 1:, 2][finger_key[:, index] >= 0] = 0.0
-    return fingertips
+
+    def __init__(
+        self,
+        finger_key: NDArray[np.int8],
+        config: HandPathConfig | None = None,
+        others: NDArray[np.floating] | None = None,
+    ) -> None:
+        self._config = config or HandPathConfig()
+        self._pressing = finger_key >= 0
+        self._problems = []
+        self._before = [np.zeros((2, LAYOUT.hand_joints)) for _ in SIDES]
+        self.fingertips: NDArray[np.float64] = np.empty((len(finger_key), 2, POINT_COUNT, 3))
+        self.planned = 0
+        for index, side in enumerate(SIDES):
+            targets, weights, clearance = _targets(finger_key[:, index], self._config)
+            if others is not None:
+                idle = (weights == 0).all(axis=2)
+                idle[:, 0] = False
+                targets[idle, :2] = others[:, index][idle, :2]
+                weights[idle, :2] = 1 / self._config.alike
+                targets[:, 0] = others[:, index, 0]
+                weights[:, 0, 1] = 1 / self._config.alike_wrist
+            hand, start = Hand(side), self._before[index][1]
+            self._problems.append(
+                PathProblem(hand, start, targets, weights, clearance, self._config.path)
+            )
+            self.fingertips[:, index] = hand.points(start)
+
+    def extend(self, stop: int, ahead: int = 0) -> None:
+        """Plan more frames.
+
+        Args:
+            stop: frame before which the plan then ends.
+            ahead: frames after it that are looked at as well, so that the hands are where they
+                must be next; what is planned of them is not final.
+        """
+        first, end = self.planned, min(stop + ahead, len(self.fingertips))
+        steps = Steps("hand paths", len(SIDES) * self._config.path.iterations * (end - first))
+        parts = [
+            problem.part(first, end, before)
+            for problem, before in zip(self._problems, self._before, strict=True)
+        ]
+        for index, path in enumerate(smooth_paths(parts, steps.advance)):
+            points = parts[index].hand.points_along(path[1:])
+            points[:, 1:, 2][self._pressing[first:end, index]] = 0.0
+            self.fingertips[first:end, index] = points
+            self._before[index] = path[stop - first - 1 : stop - first + 1]
+        self.planned = stop
+
+
+def hand_paths(
+    finger_key: NDArray[np.int8],
+    config: HandPathConfig | None = None,
+    others: NDArray[np.floating] | None = None,
+) -> NDArray[np.float64]:
+    """(T, 2, 6, 3) Points [m], as of `HandPaths`, which has the same arguments, all at once."""
+    paths = HandPaths(finger_key, config, others)
+    paths.extend(len(finger_key))
+    return paths.fingertips
 
 
 def make_feasible(plan: FingertipPlan, config: HandPathConfig | None = None) -> FingertipPlan:

@@ -10,7 +10,7 @@ linearly with the length of the piece. So does the memory, but only by the lower
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -126,7 +126,7 @@ class PathProblem:
 
     Attributes:
         hand: the hand that moves.
-        start: (27,) joint positions before the first frame, where the hand is at rest [rad, m].
+        start: (27,) joint positions before the first frame [rad, m].
         targets: (T, 6, 3) target positions of wrist and fingertips at the end of each frame,
             world frame [m].
         weights: (T, 6, 3) weight of each coordinate's error, 0 for none [1/m].
@@ -135,6 +135,8 @@ class PathProblem:
         config: weights of the other terms.
         dt: length of a frame [s]. Tracking errors are as given; all other terms count for the time
             that they last, so that a path of shorter frames is the same path.
+        earlier: (27,) joint positions a frame before `start` [rad, m]; None where the hand is at
+            rest there.
     """
 
     hand: Hand
@@ -144,6 +146,7 @@ class PathProblem:
     clearance: NDArray[np.float64]
     config: PathConfig = field(default_factory=PathConfig)
     dt: float = FRAME_SECONDS
+    earlier: NDArray[np.float64] | None = None
 
     __repr__ = short_repr
 
@@ -151,6 +154,24 @@ class PathProblem:
     def lasts(self) -> float:
         """Length of a frame, as a share of 0.05 s."""
         return self.dt / FRAME_SECONDS
+
+    def part(self, first: int, stop: int, before: NDArray[np.float64]) -> PathProblem:
+        """The problem of some of the frames, from where the hand then is.
+
+        Args:
+            first: frame with which they begin.
+            stop: frame before which they end.
+            before: (2, 27) joint positions a frame before, and at the beginning [rad, m].
+        """
+        here = slice(first, stop)
+        return replace(
+            self,
+            start=before[1],
+            targets=self.targets[here],
+            weights=self.weights[here],
+            clearance=self.clearance[here],
+            earlier=before[0],
+        )
 
     def begin(self, guess: NDArray[np.float64] | None) -> NDArray[np.float64]:
         """(T, 27) A path to begin with [rad, m].
@@ -209,7 +230,8 @@ class PathProblem:
         # A joint that is pushed against its limit stays there for this step.
         held = ((path <= hand.low) & (gradient > 0)) | ((path >= hand.high) & (gradient < 0))
         blocks[:, _LINES[0]] += held * _HELD
-        step = _step(blocks, gradient, stiffness, path, self.start)
+        earlier = self.start if self.earlier is None else self.earlier
+        step = _step(blocks, gradient, stiffness, path, np.stack([earlier, self.start]))
         return np.clip(path + np.clip(step, -config.step, config.step), hand.low, hand.high)
 
 
@@ -320,7 +342,7 @@ def _step(
     gradient: NDArray[np.float64],
     stiffness: NDArray[np.float64],
     path: NDArray[np.float64],
-    start: NDArray[np.float64],
+    before: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """(T, 27) The Gauss-Newton step [rad, m].
 
@@ -333,11 +355,10 @@ def _step(
         gradient: (T, 27) likewise.
         stiffness: (27,) weight of the second differences.
         path: (T, 27) where the step begins [rad, m].
-        start: (27,) before that path [rad, m].
+        before: (2, 27) the two positions before that path [rad, m].
     """
     frames = len(path)
-    # The hand starts from rest: in both frames before the first it is at the start.
-    second = np.diff(np.vstack([start, start, path]), n=2, axis=0)
+    second = np.diff(np.vstack([before, path]), n=2, axis=0)
     second = np.vstack([second, np.zeros((2, LAYOUT.hand_joints))])
     gradient = gradient + stiffness * (second[:-2] - 2.0 * second[1:-1] + second[2:])
 

@@ -5,7 +5,7 @@ The frames of a plan say where the hands are. Its strikes say what is to be hear
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,18 @@ class Strikes:
     def __len__(self) -> int:
         """Number of strikes."""
         return len(self.key)
+
+    def some(self, which: NDArray[np.int64], since: float) -> Strikes:
+        """Some of the strikes, timed from a later moment.
+
+        Args:
+            which: (n,) their indices, in order.
+            since: that moment [s].
+        """
+        chosen = {field.name: getattr(self, field.name)[which] for field in fields(self)}
+        return replace(
+            Strikes(**chosen), onset=chosen["onset"] - since, release=chosen["release"] - since
+        )
 
 
 def strikes_of(score: Score, fingering: Fingering) -> Strikes:

@@ -12,7 +12,7 @@ from pianomime.music import Score
 from pianomime.plan.fingering import Fingering, find_fingering
 from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.plan.fingertip_plan import FingertipPlan
-from pianomime.plan.hand_path import HandPathConfig, hand_paths
+from pianomime.plan.hand_path import HandPathConfig, HandPaths
 from pianomime.plan.strikes import strikes_of
 from pianomime.world.layout import FINGER_COUNT
 
@@ -35,11 +35,48 @@ class ZeroShotPlanner:
 
     def plan(self, score: Score) -> FingertipPlan:
         """Plan a score, as `Planner.plan` does."""
-        fingering = find_fingering(score, self.config.fingering)
-        finger_key = finger_keys(score, fingering)
-        fingertips = hand_paths(finger_key, self.config.path)
-        strikes = strikes_of(score, fingering)
-        return FingertipPlan(fingertips, finger_key, fingering.hand, fingering.finger, strikes)
+        growing = self.begin(score)
+        growing.extend(score.frames())
+        return growing.plan
+
+    def begin(self, score: Score) -> GrowingPlan:
+        """A plan whose fingering is known, and nothing of its paths yet."""
+        return GrowingPlan(score, self.config)
+
+
+class GrowingPlan:
+    """A plan whose fingering is known, and whose paths are planned from the first frame on.
+
+    Args:
+        score: what is planned.
+        config: settings of the planner.
+    """
+
+    def __init__(self, score: Score, config: ZeroShotConfig) -> None:
+        self._fingering = find_fingering(score, config.fingering)
+        self._finger_key = finger_keys(score, self._fingering)
+        self._strikes = strikes_of(score, self._fingering)
+        self._paths = HandPaths(self._finger_key, config.path)
+
+    @property
+    def plan(self) -> FingertipPlan:
+        """The plan; hands are at rest in frames that are not planned yet."""
+        return FingertipPlan(
+            self._paths.fingertips,
+            self._finger_key,
+            self._fingering.hand,
+            self._fingering.finger,
+            self._strikes,
+        )
+
+    @property
+    def planned(self) -> int:
+        """Number of frames whose paths are planned."""
+        return self._paths.planned
+
+    def extend(self, stop: int, ahead: int = 0) -> None:
+        """Plan the paths of more frames, as `HandPaths.extend` does."""
+        self._paths.extend(stop, ahead)
 
 
 def finger_keys(score: Score, fingering: Fingering) -> NDArray[np.int8]:

@@ -12,6 +12,7 @@ from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.players.generalist import GeneralistPlayer
 from pianomime.players.player import PlannedPlayer, Player
+from pianomime.players.receding_horizon import HorizonConfig, RecedingHorizonPlayer
 from pianomime.players.settings import PlayerFactory, configure
 from pianomime.policies.methods import (
     FINGERS,
@@ -76,22 +77,22 @@ def _notes(world: str) -> tuple[ZeroShotConfig, KeystrokeConfig]:
 
 
 def _zero_shot(effort: int, seed: int, world: str = PAPER, **settings: Any) -> Player:
-    planning, striking = _notes(world)
-    planner, tracker, rehearsal, sampling = configure(
+    planning, keystrokes = _notes(world)
+    planner, tracker, horizon, rehearsal, sampling = configure(
         settings,
         planner=planning,
-        tracker=striking,
+        tracker=keystrokes,
+        horizon=HorizonConfig(),
         rehearsal=RehearsalConfig(),
         sampling=replace(NoteSamplingConfig.of_effort(effort or 1), seed=seed),
     )
-    controls: Tracker = KeystrokeTracker(tracker, world)
-    if effort:
-        rehearsed = RehearsedTracker(KeystrokeTracker(tracker, world), rehearsal)
-        controls = NoteSamplingTracker(rehearsed, sampling)
-    touch = tracker.stroke.touch
-    return PlannedPlayer(
-        "zero-shot", ZeroShotPlanner(planner), controls, effort, touch=touch, world=world
-    )
+    striking, name, touch = KeystrokeTracker(tracker, world), "zero-shot", tracker.stroke.touch
+    if not effort:
+        return RecedingHorizonPlayer(
+            name, ZeroShotPlanner(planner), striking, touch=touch, world=world, horizon=horizon
+        )
+    controls = NoteSamplingTracker(RehearsedTracker(striking, rehearsal), sampling)
+    return PlannedPlayer(name, ZeroShotPlanner(planner), controls, effort, touch=touch, world=world)
 
 
 def _zero_shot_20hz(effort: int, seed: int, world: str = PAPER, **settings: Any) -> Player:
@@ -190,6 +191,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "zero-shot": {
         "planner": ZeroShotConfig(fingering=FingeringConfig.notes()),
         "tracker": KeystrokeConfig(),
+        "horizon": HorizonConfig(),
         "rehearsal": RehearsalConfig(),
         "sampling": NoteSamplingConfig.of_effort(1),
     },

@@ -228,16 +228,20 @@ class _Press:
 
 
 def motion_torque(
-    hand: Hand, path: NDArray[np.float64], dt: float = FRAME_SECONDS
+    hand: Hand,
+    path: NDArray[np.float64],
+    dt: float = FRAME_SECONDS,
+    earlier: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """(T, 27) [N m, N] torque that moves a hand along a path (T + 1, 27), without contacts.
 
     For each control step, of `dt` [s]: at its middle, with the accelerations of its two ends
-    averaged.
+    averaged. Before its path the hand came from `earlier` (27,), or was at rest.
     """
     middle = (path[1:] + path[:-1]) / 2
     velocity = np.diff(path, axis=0) / dt
-    padded = np.vstack([np.zeros_like(velocity[:1]), velocity, velocity[-1:]])
+    before = np.zeros_like(path[0]) if earlier is None else (path[0] - earlier) / dt
+    padded = np.vstack([before, velocity, velocity[-1:]])
     acceleration = (padded[2:] - padded[:-2]) / (2 * dt)
     torque = np.empty_like(middle)
     data = mujoco.MjData(hand.model)

@@ -89,15 +89,22 @@ class KeystrokeTracker:
         self.config = config or KeystrokeConfig()
         self._hands = [Hand(side, world) for side in SIDES]
 
-    def start(self, plan: FingertipPlan) -> KeystrokeController:
+    def start(
+        self, plan: FingertipPlan, before: list[NDArray[np.float64]] | None = None
+    ) -> KeystrokeController:
         """A controller with paths and the feed-forward controls that follow them.
+
+        Args:
+            plan: what to follow.
+            before: where the hands come from, see `KeystrokeController.poses_before`; None from
+                rest.
 
         Raises:
             InputError: the plan has no strikes.
         """
         if plan.strikes is None:
             raise InputError("this plan has no strikes: it says nothing of notes between frames")
-        return KeystrokeController(plan, plan.strikes, self.config, self._hands)
+        return KeystrokeController(plan, plan.strikes, self.config, self._hands, before)
 
 
 class KeystrokeController:
@@ -109,30 +116,40 @@ class KeystrokeController:
         config: settings.
         corrections: of the strikes, as they were given last.
         speeds: (M,) speed of each key's front edge at which it is to sound [m/s].
+        x: (M,) world x at which each key is struck [m].
 
     Args:
         plan: what is followed.
         strikes: of the plan.
         config: settings.
         hands: (left, right), for kinematics; their pose is not preserved.
+        before: (left, right) (S + 1, 27) joint positions at the ends of the S controls of the frame
+            before the first, the last of them at its end [rad, m]; None where hands are at rest.
     """
 
     replayable = True
 
     def __init__(
-        self, plan: FingertipPlan, strikes: Strikes, config: KeystrokeConfig, hands: list[Hand]
+        self,
+        plan: FingertipPlan,
+        strikes: Strikes,
+        config: KeystrokeConfig,
+        hands: list[Hand],
+        before: list[NDArray[np.float64]] | None = None,
     ) -> None:
         self.plan, self.strikes, self.config = plan, strikes, config
         self.speeds = config.stroke.speeds(strikes)
         self._hands = hands
+        rest = np.zeros((config.controls + 1, LAYOUT.hand_joints))
+        self._before = before or [rest] * len(hands)
         ends = np.arange(1, len(plan) * config.controls + 1, dtype=np.float64)
         self._times = ends * self._dt
         self._gain = np.full(LAYOUT.hand_joints, config.joint_feedback)
         self._gain[LAYOUT.slides] = config.slide_feedback
         frame = np.floor(strikes.onset / FRAME_SECONDS).astype(int).clip(0, len(plan) - 1)
-        self._x = plan.fingertips[frame, strikes.hand, 1 + strikes.finger, 0]
+        self.x = plan.fingertips[frame, strikes.hand, 1 + strikes.finger, 0]
         hinge = key_centres()[strikes.key, 0] - key_half_sizes()[strikes.key, 0]
-        self._reach = self._x - hinge
+        self._reach = self.x - hinge
         self._strike_with(Corrections.none(len(strikes)))
         steps = Steps("paths", len(hands) * config.path.iterations * len(plan))
         self._paths = self._coarse_paths(steps)
@@ -153,6 +170,11 @@ class KeystrokeController:
     def correction_steps(self) -> int:
         """The steps of `correct`, as it counts them."""
         return self._steps(self.config.again)
+
+    def poses_before(self, frame: int) -> list[NDArray[np.float64]]:
+        """Where the hands come from when a frame after the first begins, as for `before`."""
+        stop = frame * self.config.controls + 1
+        return [path[stop - self.config.controls - 1 : stop] for path in self._paths]
 
     def correct(self, corrections: Corrections, advance: Callable[[int], None] = ignore) -> None:
         """Aim at other times and speeds.
@@ -193,12 +215,14 @@ class KeystrokeController:
             targets, weights = self._targets(index)
             weights *= share
             weights[:, 1:][self._strokes.tight[:, index]] /= share
-            problems.append(self._problem(index, targets, weights, config, self._dt))
+            lately = self._before[index][[-2, -1]]
+            problems.append(self._problem(index, targets, weights, config, lately, self._dt))
         self._paths = smooth_paths(problems, advance, [path[1:] for path in self._paths])
         for index, (hand, path) in enumerate(zip(self._hands, self._paths, strict=True)):
             self._follow(index, hand, path)
             advance(count)
-            torque = to_actuators(hand, motion_torque(hand, path, self._dt)) / hand.gain
+            earlier = self._before[index][-2]
+            torque = to_actuators(hand, motion_torque(hand, path, self._dt, earlier)) / hand.gain
             self._feedforward[:, hand.actuators] = (path[1:] + path[:-1]) / 2 @ hand.to_ctrl.T
             self._feedforward[:, hand.actuators] += torque
             advance(count)
@@ -250,12 +274,14 @@ class KeystrokeController:
         targets: NDArray[np.float64],
         weights: NDArray[np.float64],
         config: PathConfig,
+        before: NDArray[np.float64],
         dt: float,
     ) -> PathProblem:
-        """What the path of one hand is to be, from rest."""
-        start = np.zeros(LAYOUT.hand_joints)
+        """What the path of one hand is to be, from two poses (2, 27) on that are `dt` apart."""
         clearance = np.full((len(targets), FINGER_COUNT), np.nan)
-        return PathProblem(self._hands[index], start, targets, weights, clearance, config, dt)
+        return PathProblem(
+            self._hands[index], before[1], targets, weights, clearance, config, dt, before[0]
+        )
 
     def _coarse_paths(self, steps: Steps) -> list[NDArray[np.float64]]:
         """(n + 1, 27) for each hand, to begin with: those of frames, straight between them."""
@@ -263,7 +289,10 @@ class KeystrokeController:
         problems = []
         for index in range(len(self._hands)):
             targets, weights = (array[ends] for array in self._targets(index))
-            problems.append(self._problem(index, targets, weights, self.config.path, FRAME_SECONDS))
+            lately = self._before[index][[0, -1]]
+            problems.append(
+                self._problem(index, targets, weights, self.config.path, lately, FRAME_SECONDS)
+            )
         at = np.arange(len(self.plan) + 1) * FRAME_SECONDS
         times = np.append(0.0, self._times)
         return [
@@ -291,7 +320,7 @@ class KeystrokeController:
         strike = self._strokes.strike[:, index]
         busy = strike >= 0
         key = self.strikes.key[strike[busy]]
-        targets[:, 1:, 0][busy] = self._x[strike[busy]]
+        targets[:, 1:, 0][busy] = self.x[strike[busy]]
         targets[:, 1:, 1][busy] = key_centres()[key, 1]
         targets[:, 1:, 2][busy] = KEY_REST[key] + self._strokes.height[:, index][busy]
         weights[:, 1:][busy] = 1 / _PRESS_TOLERANCE
