@@ -11,7 +11,6 @@ export interface Head {
   effort: number;
   world: string;
   touch: string;
-  works_pedal: boolean;
   seconds: number;
   rate: number;
   positions: number;

@@ -1,6 +1,6 @@
 /** The app: a library beside the performance that is watched, or beside two that are compared. */
 
-import { make } from "../dom";
+import { make, wantsCalm } from "../dom";
 import { clockTime } from "../wording";
 import * as api from "./api";
 import { better, side } from "./measures";
@@ -114,7 +114,14 @@ export class App {
       });
     }
     addEventListener("drop", (event) => {
-      void this.take([...(event.dataTransfer?.files ?? [])]);
+      const items = [...(event.dataTransfer?.items ?? [])].filter(({ kind }) => kind === "file");
+      // A folder is a file as well, until one asks for its bytes.
+      const folders = items.map((item) => item.webkitGetAsEntry()?.isDirectory ?? false);
+      const files = items.map((item) => item.getAsFile());
+      void this.take(
+        files.filter((file, i): file is File => file !== null && !folders[i]),
+        files.flatMap((file, i) => (file !== null && folders[i] ? [file.name] : [])),
+      );
     });
     this.takeChange();
     void this.load();
@@ -136,14 +143,14 @@ export class App {
   private button(text: string, act: () => unknown): HTMLButtonElement {
     const button = make("button", { type: "button" }, text);
     button.addEventListener("click", () => {
+      this.tell(null);
       void this.attempt(act);
     });
     return button;
   }
 
-  /** Do something, and tell the user if it fails. */
+  /** Do something, and tell the user if it fails, until the user does something else. */
   private async attempt(act: () => unknown): Promise<void> {
-    this.tell(null);
     try {
       await act();
     } catch (error) {
@@ -220,11 +227,16 @@ export class App {
     );
   }
 
-  /** Take files that were dropped, and play the first that can be. */
-  private async take(files: File[]): Promise<void> {
+  /**
+   * Take files that were dropped, and play the first that can be.
+   *
+   * @param folders names of folders that were dropped with them.
+   */
+  private async take(files: File[], folders: string[] = []): Promise<void> {
+    this.tell(null);
     await this.attempt(async () => {
-      let first: api.Song | null = null;
-      const failed: string[] = [];
+      const taken: api.Song[] = [];
+      const lines = folders.map((name) => `${name} is a folder: drop the MIDI files that it holds.`);
       for (const file of files) {
         const limit = this.library?.limit ?? Infinity;
         try {
@@ -234,16 +246,20 @@ export class App {
                 "For a recording, make MIDI of it first.",
             );
           }
-          first ??= await api.upload(file);
+          taken.push(await api.upload(file));
         } catch (error) {
           if (!(error instanceof api.Refused)) throw error;
-          failed.push(error.message);
+          lines.push(error.message);
         }
       }
+      const [first] = taken;
+      if (taken.length > 1) {
+        lines.push(`${taken.length} songs are in the library now; ${first!.title} is played.`);
+      }
+      lines.push(...taken.flatMap(({ remarks }) => remarks));
+      if (lines.length > 0) this.tell(lines.join(" "));
       if (first) await this.show({ song: first.id, ...this.settings });
       await this.load();
-      const remarks = first?.remarks ?? [];
-      if (failed.length + remarks.length > 0) this.tell([...failed, ...remarks].join(" "));
     });
   }
 
@@ -258,7 +274,7 @@ export class App {
     const [first] = this.seats;
     seat.replay.follow(first.replay);
     first.replay.currentTime = 0;
-    first.replay.play();
+    if (!wantsCalm()) first.replay.play();
   }
 
   private async again(): Promise<void> {
