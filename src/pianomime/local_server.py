@@ -21,15 +21,19 @@ import logging
 import re
 import secrets
 import sys
+import tempfile
 import threading
+import webbrowser
 from collections.abc import Mapping
+from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, ClassVar
 
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 from tornado.web import Application, HTTPError, RequestHandler
 
+from pianomime.closing import Closing
 from pianomime.errors import InputError
 
 _ANY, _NAME = re.escape("{}"), "([-.\\w]+)"
@@ -41,6 +45,8 @@ _LARGEST_HEADERS = 16_384
 """[bytes]"""
 _LARGEST_BODY = 100_000
 """[bytes]"""
+_SANDBOXED = "null"
+"""What browsers call the origin of a page that has none."""
 _PATIENCE = 10.0
 """[s] The longest that the headers of a request may take, and then its body."""
 
@@ -53,6 +59,15 @@ class LocalHandler(RequestHandler):
 
     A web socket's handler may inherit from this class and Tornado's `WebSocketHandler`.
     """
+
+    for_sandboxed: ClassVar[bool] = False
+    """Whether a page of this server that runs in a sandbox, and so has no origin, may read it."""
+    closed = False
+    """Whether the connection was closed before the answer was complete."""
+
+    def on_connection_close(self) -> None:
+        """Take note."""
+        self.closed = True
 
     def set_default_headers(self) -> None:
         """Have the browser load nothing from elsewhere, keep nothing, and show it in no frame."""
@@ -79,6 +94,9 @@ class LocalHandler(RequestHandler):
         origin = self.request.headers.get("Origin")
         asks = self.request.method == "GET"
         upgrades = "Upgrade" in self.request.headers
+        if origin == _SANDBOXED and self.for_sandboxed:
+            self.set_header("Access-Control-Allow-Origin", _SANDBOXED)
+            origin = None
         if host not in self.settings["hosts"]:
             raise HTTPError(403, reason="Not the address of this page")
         # A browser says where all comes from but what a page of the same server only asks for.
@@ -104,6 +122,24 @@ class LocalHandler(RequestHandler):
             print(f"pianomime: a request failed: {error!r}", file=sys.stderr)
 
 
+class Content(LocalHandler):
+    """Answers with a content that does not change."""
+
+    def initialize(self, kind: str, content: str | bytes) -> None:
+        """Take what `LocalServer` was given.
+
+        Args:
+            kind: its media type.
+            content: what it is.
+        """
+        self._kind, self._content = kind, content
+
+    def get(self) -> None:
+        """Answer."""
+        self.set_header("Content-Type", self._kind)
+        self.finish(self._content)
+
+
 class _Nothing(LocalHandler):
     """Answers where there is nothing."""
 
@@ -112,7 +148,7 @@ class _Nothing(LocalHandler):
         raise HTTPError(404)
 
 
-class LocalServer:
+class LocalServer(Closing):
     """Serves in a thread of its own, many browsers at a time. Use it as a context manager.
 
     Attributes:
@@ -157,6 +193,7 @@ class LocalServer:
             hosts=hosts,
             secret=secret,
         )
+        self._door: Path | None = None
         self._loop = asyncio.new_event_loop()
         self._stop = asyncio.Event()
         self._thread = threading.Thread(target=self._run, name="local server", daemon=True)
@@ -166,17 +203,26 @@ class LocalServer:
         """Close all connections, and wait until that is done."""
         self._loop.call_soon_threadsafe(self._stop.set)
         self._thread.join()
+        if self._door is not None:
+            self._door.unlink(missing_ok=True)
 
-    def __enter__(self) -> Self:
-        return self
+    def open_browser(self, folder: Path) -> None:
+        """Open the page in the user's browser.
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
+        Everybody at this machine can read command lines, so the browser is given a file that only
+        this user can read, and which leads to the address.
+
+        Args:
+            folder: for the file, which is removed when the server is closed.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        handle, name = tempfile.mkstemp(".html", "open-", folder)
+        self._door = Path(name)
+        with open(handle, "w", encoding="utf-8") as file:
+            file.write(f'<meta charset="utf-8"><meta http-equiv="refresh" content="0; {self.url}">')
+        webbrowser.open(self._door.absolute().as_uri())
 
     def _run(self) -> None:
         with asyncio.Runner(loop_factory=lambda: self._loop) as runner:

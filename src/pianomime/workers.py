@@ -27,9 +27,9 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Collection, Generator, Iterable
 from pathlib import Path
-from types import TracebackType
 from typing import Any, TextIO, TypeVar
 
+from pianomime.closing import Closing
 from pianomime.errors import InputError
 from pianomime.shown import shown
 from pianomime.stop import Stopped, stoppable
@@ -117,7 +117,7 @@ def work(
                 thread.join()
 
 
-class Worker:
+class Worker(Closing):
     """A process that works for this one, started at once, and again after a crash.
 
     Args:
@@ -195,17 +195,6 @@ class Worker:
         with contextlib.suppress(BrokenPipeError):  # The first request finds out.
             print(self._setup, file=process.stdin, flush=True)
         return process
-
-    def __enter__(self) -> Worker:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def answered(answer: Answer, request: Any) -> Row:

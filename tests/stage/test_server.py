@@ -5,9 +5,13 @@ from __future__ import annotations
 import http.client
 import json
 import os
+import signal
 import struct
+import subprocess
+import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
@@ -18,6 +22,9 @@ import pytest
 from pianomime import Performance, Score, load_player, songs
 from pianomime.keyboard import LEAD_IN_SECONDS
 from pianomime.music.excerpt import excerpt
+from pianomime.stage.jobs import Job
+from pianomime.stage.library import Library
+from pianomime.stage.playing import WholeParts
 from pianomime.stage.server import LARGEST_SONG, Stage
 
 SECONDS = 2.0
@@ -68,6 +75,16 @@ def blocks(replay: bytes) -> list[tuple[str, bytes]]:
 
 def last(found: list[tuple[str, bytes]], tag: str) -> Any:
     return json.loads([content for name, content in found if name == tag][-1])
+
+
+def long_job(client: Client, stage: Stage) -> tuple[http.client.HTTPResponse, Job]:
+    """A job that would take minutes, and its replay, which is being read."""
+    number = client.play(effort=3, seconds=None)
+    replay = client.open("GET", f"jobs/{number}/replay")
+    assert replay.read(4) == b"HEAD"
+    job = stage.jobs.get(number)
+    assert job is not None
+    return replay, job
 
 
 def wait_for(what: Callable[[], bool]) -> None:
@@ -230,42 +247,157 @@ def test_a_page_has_one_job_and_another_page_its_own(stage: Stage) -> None:
 
 def test_what_is_stopped_ends_its_process_and_leaves_nothing(stage: Stage, tmp_path: Path) -> None:
     client = Client(stage)
-    job = client.play(effort=3, seconds=None)
-    replay = client.open("GET", f"jobs/{job}/replay")
-    assert replay.read(4) == b"HEAD"
-    found = stage.jobs.get(job)
-    assert found is not None
-    pid = found.pid
-    assert client.open("DELETE", f"jobs/{job}").status == 200
+    _, job = long_job(client, stage)
+    pid = job.pid
+    assert client.open("DELETE", f"jobs/{job.number}").status == 200
     wait_for(lambda: not _alive(pid))
     assert [path.name for path in (tmp_path / "out").iterdir() if path.name != "songs"] == []
 
 
 def test_a_page_that_is_closed_stops_its_job(stage: Stage) -> None:
     client = Client(stage)
-    job = client.play(effort=3, seconds=None)
-    replay = client.open("GET", f"jobs/{job}/replay")
-    assert replay.read(4) == b"HEAD"
-    found = stage.jobs.get(job)
-    assert found is not None
+    replay, job = long_job(client, stage)
     replay.close()
-    wait_for(lambda: found.done)
-    assert not _alive(found.pid)
+    wait_for(lambda: job.done)
+    assert not _alive(job.pid)
+
+
+def test_a_page_that_is_closed_stops_a_job_that_says_nothing(
+    stage: Stage,
+) -> None:
+    client = Client(stage)
+    replay, job = long_job(client, stage)
+    # What is not written cannot fail to be sent.
+    os.kill(job.pid, signal.SIGSTOP)
+    try:
+        time.sleep(0.2)
+        replay.close()
+        wait_for(lambda: job._readers == 0)
+    finally:
+        os.kill(job.pid, signal.SIGCONT)
+    wait_for(lambda: job.done)
 
 
 def test_a_process_that_is_killed_is_told(stage: Stage) -> None:
     client = Client(stage)
-    job = client.play(effort=3, seconds=None)
-    replay = client.open("GET", f"jobs/{job}/replay")
-    assert replay.read(4) == b"HEAD"
-    found = stage.jobs.get(job)
-    assert found is not None
-    os.kill(found.pid, 9)
+    replay, job = long_job(client, stage)
+    os.kill(job.pid, 9)
     rest = replay.read()
     assert rest[-200:].count(b"FAIL") == 1
     assert b"process died" in rest[-200:]
     # The next one plays.
     assert blocks(client.open("GET", f"jobs/{client.play()}/replay").read())[-1][0] == "DONE"
+
+
+def test_the_sound_that_is_asked_for_at_the_end_is_the_whole_one(stage: Stage) -> None:
+    """Law: also in the moment in which the replay says that it is done."""
+    client = Client(stage)
+    job = client.play()
+    whole = client.open("GET", f"jobs/{job}/sound?whole")
+    assert whole.headers["Content-Length"] is not None
+    assert whole.read() == client.open("GET", f"jobs/{job}/sound").read()
+    assert client.open("GET", f"jobs/{job}/wanted").status == 200
+
+
+@pytest.mark.parametrize(
+    ("asked", "status", "span"),
+    [
+        ("bytes=0-9", 206, (0, 10)),
+        ("bytes=-10", 206, (-10, None)),
+        ("bytes=5-", 206, (5, None)),
+        ("bytes=5-2", 200, (0, None)),
+        ("bytes=-0", 200, (0, None)),
+        ("bytes=\xb2-\xb2", 200, (0, None)),
+        ("bytes=99999999-", 200, (0, None)),
+        ("lines=1-2", 200, (0, None)),
+        ("bytes=-99999999", 200, (0, None)),
+    ],
+)
+def test_parts_of_a_file(
+    stage: Stage, tmp_path: Path, asked: str, status: int, span: tuple[int, int | None]
+) -> None:
+    content = bytes(range(256)) * 4
+    report = tmp_path / "report"
+    report.mkdir()
+    (report / "performance.mp3").write_bytes(content)
+    client = Client(stage)
+    number = client.play()
+    client.open("GET", f"jobs/{number}/replay").read()
+    job = stage.jobs.get(number)
+    assert job is not None
+    wait_for(lambda: job.done)
+    job.report = report
+    answer = client.open("GET", f"jobs/{number}/sound", Range=asked)
+    assert (answer.status, answer.read()) == (status, content[slice(*span)])
+
+
+def test_the_page_of_a_long_report_reads_its_parts_from_a_sandbox(stage: Stage) -> None:
+    client = Client(stage)
+    job = client.play()
+    page = client.open("GET", f"jobs/{job}/files/report.html")
+    policy = page.headers["Content-Security-Policy"]
+    page.read()
+    assert "sandbox allow-scripts allow-downloads" in policy
+    assert "allow-same-origin" not in policy
+    part = client.open("GET", f"jobs/{job}/files/performance.mp3", Origin="null")
+    assert part.status in (200, 404)
+    assert part.headers["Access-Control-Allow-Origin"] == "null"
+    for path in ("library", f"jobs/{job}/replay"):
+        assert client.refused("GET", path, Origin="null")[0] == 403
+    assert client.refused("POST", "jobs", b"{}", Origin="null")[0] == 403
+
+
+def test_songs_beside_performances_are_listed(tmp_path: Path) -> None:
+    folder = tmp_path / "given"
+    player = load_player("zero-shot", effort=0)
+    score = excerpt(Score.from_midi(songs.path("beethoven-ode-to-joy")), seconds=1.0)
+    (folder / "played").mkdir(parents=True)
+    player.play(score).save(folder / "played" / "performance.npz")
+    score.to_midi(folder / "played" / "performance.mid")
+    score.to_midi(folder / "mine.mid")
+    listed = Library(tmp_path / "out", [folder]).listed()
+    assert len(listed["performances"]) == 1
+    assert len(listed["songs"]) == len(songs.names()) + 1
+
+
+def test_two_songs_of_one_name_are_both_kept(tmp_path: Path) -> None:
+    library = Library(tmp_path / "out", [])
+    contents = []
+    for number in range(6):
+        Score([40 + number], [0.0], [0.5], [64]).to_midi(tmp_path / "song.mid")
+        contents.append((tmp_path / "song.mid").read_bytes())
+    with ThreadPoolExecutor(6) as pool:
+        kept = list(pool.map(lambda content: library.upload("song.mid", content), contents))
+    for content, song in zip(contents, kept, strict=True):
+        path = library.path(song["id"])
+        assert path is not None
+        assert path.read_bytes() == content
+
+
+def test_what_a_full_disk_cannot_hold_is_left_out_whole(tmp_path: Path) -> None:
+    """Half of a block would be read as a damaged one."""
+    path = tmp_path / "live.replay"
+    # A limit on the size of files does to them what a full disk does: of a part some is written.
+    program = f"""
+import resource
+from pianomime.stage.playing import WholeParts
+resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))
+with WholeParts({os.fspath(path)!r}, "wb") as file:
+    file.write(b"123456")
+    try:
+        file.write(b"abcdefgh")
+    except OSError:
+        file.write(b"789")
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+    assert path.read_bytes() == b"123456789"
+
+
+def test_a_stage_that_is_closed_meanwhile_closes(tmp_path: Path, stage: Stage) -> None:
+    with Stage(tmp_path / "other", []) as closing:
+        client = Client(closing)
+        _, job = long_job(client, closing)
+    assert not _alive(job.pid)
 
 
 def _alive(pid: int) -> bool:

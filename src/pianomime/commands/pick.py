@@ -39,8 +39,6 @@ class Pick:
             InputError: the video cannot be read, OUT is not a .json file, or the port is in use.
             OSError: a file cannot be read or written.
         """
-        import webbrowser
-
         from pianomime.commands.extras import extra
         from pianomime.errors import InputError
         from pianomime.file_names import file_name
@@ -57,7 +55,7 @@ class Pick:
             out.parent.mkdir(parents=True, exist_ok=True)
             print(f"click the points on {page.url} (Ctrl-C to cancel)", flush=True)
             if self.browser:
-                webbrowser.open(page.url)
+                page.open_browser()
             saved = page.wait()
         print(f"saved {shown(out)}: {shown(saved)}")
         print(f"next: pianomime retarget {command_word(self.video)} --points {command_word(out)}")

@@ -46,7 +46,6 @@ class StageCommand:
             OSError: OUT cannot be written.
         """
         import threading
-        import webbrowser
 
         from pianomime.commands.extras import extra
 
@@ -56,5 +55,5 @@ class StageCommand:
         with Stage(self.out, self.given, self.port) as stage:
             print(f"the stage is at {stage.url} (Ctrl-C to end)", flush=True)
             if self.browser:
-                webbrowser.open(stage.url)
+                stage.open_browser()
             threading.Event().wait()

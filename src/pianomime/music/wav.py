@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import wave
 from collections.abc import Iterable, Iterator
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.closing import Closing
 from pianomime.files import atomic
 from pianomime.music.sound import SAMPLE_RATE
 
@@ -59,7 +59,7 @@ def write_wav_blocks(
             file.writeframes(np.rint(samples).astype("<i2").tobytes())
 
 
-class WavFile:
+class WavFile(Closing):
     """The samples of a 16-bit WAV file, read when they are asked for. Use it as a context manager.
 
     Attributes:
@@ -80,15 +80,8 @@ class WavFile:
         self.shape = self._file.getnframes(), self._file.getnchannels()
         self.sample_rate = self._file.getframerate()
 
-    def __enter__(self) -> WavFile:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Close it."""
         self._file.close()
 
     def __getitem__(self, samples: slice) -> NDArray[np.float32]:

@@ -30,7 +30,6 @@ def head_block(
     effort: int,
     world: str,
     touch: str,
-    works_pedal: bool,
     rate: int,
 ) -> bytes:
     """The block that says what is played by whom.
@@ -41,7 +40,6 @@ def head_block(
         effort: how hard it tries, 0 to 3.
         world: name of the world in which it plays.
         touch: name of the map from the speed of a key to MIDI velocity.
-        works_pedal: whether the player works the pedal.
         rate: poses per second.
     """
     return json_block(
@@ -54,7 +52,6 @@ def head_block(
             "effort": effort,
             "world": world,
             "touch": touch,
-            "works_pedal": works_pedal,
             "seconds": score.frames() / FRAME_RATE,
             "rate": rate,
             "positions": LAYOUT.qpos_size,
@@ -91,7 +88,6 @@ def replay_blocks(performance: Performance, row: Row, poses: Poses) -> Iterator[
         performance.effort,
         performance.world,
         performance.touch,
-        performance.works_pedal,
         poses.rate,
     )
     yield scene_block()

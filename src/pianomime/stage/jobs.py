@@ -8,7 +8,7 @@ import os
 import secrets
 import shutil
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +33,10 @@ class Job:
 
     Attributes:
         number: what it is called.
-        page: the page that asked for it.
+        page: the seat of a page that asked for it.
         folder: of its files that grow, `REPLAY` and `SOUND`.
         report: folder of the report, when it is done.
-        done: whether it has ended, in whatever way.
+        ended: is set when it has, in whatever way.
     """
 
     def __init__(
@@ -46,9 +46,14 @@ class Job:
         self.number, self.page, self.folder = number, page, folder
         self.request = {**request, "folder": os.fspath(folder)}
         self.report: Path | None = None
-        self.done = False
+        self.ended = asyncio.Event()
         self._failure: str | None = None
         self._readers = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended, in whatever way."""
+        return self.ended.is_set()
 
     def start(self) -> None:
         """Have its process do it, which is closed in the end."""
@@ -75,11 +80,15 @@ class Job:
         """Number of its process."""
         return self._worker.pid
 
-    async def replay(self) -> AsyncIterator[bytes]:
-        """The blocks of the replay, as they come, and in the end why it failed, if it did."""
+    async def replay(self, closed: Callable[[], bool]) -> AsyncIterator[bytes]:
+        """The blocks of the replay, as they come, and in the end why it failed, if it did.
+
+        Args:
+            closed: tells whether nobody reads them any more.
+        """
         self._readers += 1
         try:
-            async for part in self._growing(self.folder / REPLAY):
+            async for part in self._growing(self.folder / REPLAY, closed):
                 yield part
             if self._failure is not None:
                 yield json_block("FAIL", {"message": self._failure})
@@ -87,13 +96,13 @@ class Job:
             self._readers -= 1
             asyncio.get_running_loop().call_later(_GRACE_SECONDS, self._stop_if_alone)
 
-    def sound(self) -> AsyncIterator[bytes]:
-        """MP3 of what was played, as it comes."""
-        return self._growing(self.folder / SOUND)
+    def sound(self, closed: Callable[[], bool]) -> AsyncIterator[bytes]:
+        """MP3 of what was played, as it comes; `closed` is as for `replay`."""
+        return self._growing(self.folder / SOUND, closed)
 
-    async def _growing(self, path: Path) -> AsyncIterator[bytes]:
+    async def _growing(self, path: Path, closed: Callable[[], bool]) -> AsyncIterator[bytes]:
         position = 0
-        while True:
+        while not closed():
             # Before reading: what was written by then is read.
             done = self.done
             with contextlib.suppress(FileNotFoundError), path.open("rb") as file:
@@ -111,7 +120,7 @@ class Job:
         else:
             self.report = Path(row["report"])
             self._failure = None
-        self.done = True
+        self.ended.set()
 
     def _stop_if_alone(self) -> None:
         if not self._readers:
@@ -119,7 +128,7 @@ class Job:
 
 
 class Jobs:
-    """All jobs of a stage. A page has one at a time; a process is kept waiting for the next.
+    """All jobs of a stage. A seat of a page has one at a time; a process waits for the next.
 
     Args:
         folder: for the files of jobs.
@@ -135,17 +144,18 @@ class Jobs:
         """Begin a job; the one that this page had before is stopped.
 
         Args:
-            page: which page asks.
+            page: which seat of which page asks.
             request: for `pianomime.stage.playing`.
 
         Raises:
             OSError: there is no room for its files.
         """
-        for job in self._jobs.values():
-            if job.page == page:
-                job.stop()
+        mine = [job for job in self._jobs.values() if job.page == page]
+        for job in mine:
+            job.stop()
         ended = [job for job in self._jobs.values() if job.done]
-        for job in ended[:-_MOST_DONE]:
+        # What a page showed before, it shows no longer.
+        for job in {*ended[:-_MOST_DONE], *(job for job in mine if job.done)}:
             del self._jobs[job.number]
             shutil.rmtree(job.folder, ignore_errors=True)
         number = secrets.token_hex(8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import threading
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from pianomime.files import atomic
 from pianomime.music import Score
 from pianomime.players.performance import Performance, is_performance
 from pianomime.shown import shown
-from pianomime.songs.find import find_songs
+from pianomime.songs.find import MIDI_SUFFIXES, find_songs
 
 _UPLOADS = "songs"
 """Folder of files that were dropped, in that of the stage."""
@@ -69,6 +70,7 @@ class Library:
 
     def __init__(self, out: Path, given: Sequence[Path]) -> None:
         self._out = out
+        self._lock = threading.Lock()
         self._paths: dict[str, Path] = {}
         self._shown: dict[str, dict[str, Any]] = {}
         self._songs = [songs.path(name) for name in songs.names()]
@@ -119,6 +121,10 @@ class Library:
         """
         if not content:
             raise InputError("the file is empty")
+        with self._lock:  # two may be of one name
+            return self._keep(name, content)
+
+    def _keep(self, name: str, content: bytes) -> dict[str, Any]:
         folder = self._out / _UPLOADS
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{file_name(Path(name).stem or 'song')}.mid"
@@ -144,7 +150,15 @@ class Library:
         elif path.is_dir():
             performances = [file for file in sorted(path.rglob("*.npz")) if is_performance(file)]
             self._performances += performances
-            if not performances:
+            # MIDI files beside a performance are its own.
+            results = {file.parent for file in performances}
+            if performances:
+                self._songs += [
+                    song
+                    for song in sorted(path.rglob("*"))
+                    if song.suffix.lower() in MIDI_SUFFIXES and song.parent not in results
+                ]
+            else:
                 self._songs += find_songs([path])
         else:
             self._songs += find_songs([path])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from typing import IO
+from types import TracebackType
+from typing import IO, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +50,8 @@ _RINGING = 60.0
 class LiveReplay:
     """Writes the replay and the sound of a score while a player plays it.
 
-    It is an `Observer`, and its `progress` is to be told as well.
+    It is an `Observer`, and its `progress` is to be told as well. Use it as a context manager,
+    which ends the sound.
 
     Args:
         score: what is played.
@@ -70,13 +72,7 @@ class LiveReplay:
         self._told = -np.inf
         self._pedalled: list[bool] = []
         head = head_block(
-            score,
-            player.name,
-            player.effort,
-            player.world,
-            player.touch,
-            False,
-            POSES_PER_SECOND,
+            score, player.name, player.effort, player.world, player.touch, POSES_PER_SECOND
         )
         self._write(head, scene_block(), notes_block(score, None), pedal_block(score.pedal))
 
@@ -109,9 +105,16 @@ class LiveReplay:
         if self._frames % _BATCH_FRAMES == 0 or last:
             self._write_motion()
 
-    def close(self) -> None:
-        """End the sound."""
-        self._sound.__exit__(None, None, None)
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._sound.__exit__(kind, error, trace)
 
     def _write(self, *blocks: bytes) -> None:
         for block in blocks:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import gzip
+import io
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from pianomime.replay import Judgement, done_block, heard_block, notes_block, sc
 from pianomime.replay.blocks import json_block
 from pianomime.report import FILES, write_report
 from pianomime.stage.live import LiveReplay
+from pianomime.staging import BusyError
 from pianomime.workers import Answer, Row
 
 WORKER = "pianomime.stage.playing:load"
@@ -47,11 +47,11 @@ def load(setup: dict[str, str]) -> Answer:
 
     def answer(request: dict[str, Any]) -> Row:
         folder = Path(request["folder"])
-        with (folder / REPLAY).open("wb", buffering=0) as replay:
+        with WholeParts(folder / REPLAY, "wb") as replay:
             if "performance" in request:
                 report = _prepare(Path(request["performance"]), folder / REPORT, replay)
             else:
-                with (folder / SOUND).open("wb", buffering=0) as sound:
+                with WholeParts(folder / SOUND, "wb") as sound:
                     report = _play(request, out, replay, sound)
         return {"report": os.fspath(report)}
 
@@ -73,14 +73,12 @@ def _play(request: dict[str, Any], out: Path, replay: Any, sound: Any) -> Path:
     lead_in = LEAD_IN_SECONDS if casting.takes_lead_in else 0.0
     seconds = np.inf if request["seconds"] is None else request["seconds"]
     player, score = casting.cast(Path(request["song"]), 0.0, seconds, lead_in)
-    live = LiveReplay(score, player, replay, sound)
-    performance = player.play(score, live.progress, live)
-    live.close()
+    with LiveReplay(score, player, replay, sound) as live:
+        performance = player.play(score, live.progress, live)
     judgement = Judgement.of(performance)
     replay.write(notes_block(score, performance.plan, judgement))
     replay.write(heard_block(performance.played(), 0, judgement))
-    with _new_folder(out, file_name(score.title)) as folder:
-        row = _report(performance, folder)
+    folder, row = _report_in_new_folder(performance, out, file_name(score.title))
     replay.write(done_block(row))
     return folder
 
@@ -102,19 +100,30 @@ def _report(performance: Performance, folder: Path) -> Row:
         )
 
 
-@contextmanager
-def _new_folder(out: Path, name: str) -> Iterator[Path]:
-    """A folder of a name that is not taken; it is removed again if nothing comes of it."""
-    out.mkdir(parents=True, exist_ok=True)
+def _report_in_new_folder(performance: Performance, out: Path, name: str) -> tuple[Path, Row]:
+    """Write a report into a folder of a name that is not taken; the folder and its row."""
     for number in count(1):
         folder = out / (name if number == 1 else f"{name}-{number}")
+        if not folder.exists():
+            try:
+                return folder, _report(performance, folder)
+            except BusyError:  # Another song of this name comes to its end.
+                continue
+    raise AssertionError("there are always more numbers")
+
+
+class WholeParts(io.FileIO):
+    """A file that has each of what is written at once, and whole or not at all."""
+
+    def write(self, part: Any, /) -> int:
+        """Write it; where there is no room for it, as on a full disk, nothing."""
+        before, rest = self.tell(), memoryview(part)
         try:
-            folder.mkdir()
-            break
-        except FileExistsError:
-            continue
-    try:
-        yield folder
-    except BaseException:
-        shutil.rmtree(folder, ignore_errors=True)
-        raise
+            while len(rest):
+                rest = rest[super().write(rest) :]
+        except OSError:
+            # Half of a block would be read as a damaged one.
+            self.truncate(before)
+            self.seek(before)
+            raise
+        return len(part)

@@ -6,17 +6,18 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 from urllib.parse import unquote
 
 from tornado.iostream import StreamClosedError
 from tornado.web import stream_request_body
 
+from pianomime.closing import Closing
 from pianomime.errors import InputError
-from pianomime.local_server import LocalHandler, LocalServer
+from pianomime.local_server import Content, LocalHandler, LocalServer
 from pianomime.players.registry import EFFORT, player_files, player_names
 from pianomime.policies.methods import METHODS
 from pianomime.replay.page_script import page_script
@@ -37,21 +38,17 @@ _KINDS = {
     "report.html": "text/html; charset=utf-8",
 }
 """Files of a report that may be downloaded, and their media types."""
+_PARTS = {
+    "performance.mp3": "audio/mpeg",
+    "score.mp3": "audio/mpeg",
+    "performance.replay.gz": "application/octet-stream",
+}
+"""Files that the page of a long report reads because it does not hold them; their media types."""
+_SPAN = re.compile(r"bytes=([0-9]*)-([0-9]*)")
 _BODY = '<script type="module" src="stage.js"></script>\n'
 _EFFORTS = range(4)
 _NO_PLAYERS_OF_SONGS = ("demonstration", "demonstration-ik", "expert")
 """They play what is given in place of a song."""
-
-
-class _Page(LocalHandler):
-    """The page, and its script."""
-
-    def initialize(self, kind: str, content: str) -> None:
-        self._kind, self._content = kind, content
-
-    def get(self) -> None:
-        self.set_header("Content-Type", self._kind)
-        self.finish(self._content)
 
 
 class _Handler(LocalHandler):
@@ -86,6 +83,17 @@ class _Handler(LocalHandler):
                     await self.flush()
         finally:
             await parts.aclose()  # type: ignore[attr-defined]
+
+    def _is_closed(self) -> bool:
+        return self.closed
+
+    async def send_part(self, job: Job, name: str) -> None:
+        """Answer with a part of the report of a job, once that has ended."""
+        await job.ended.wait()
+        if job.report is None or not (job.report / name).is_file():
+            self.refuse(404, "It is not there.")
+        else:
+            await self.send_file(job.report / name, _PARTS[name])
 
     async def send_file(self, path: Path, kind: str) -> None:
         """Answer with a file, or with the part of it that is asked for."""
@@ -173,7 +181,7 @@ class _Replay(_Handler):
     async def get(self, number: str) -> None:
         if (job := self.job(number)) is not None:
             self.set_header("Content-Type", "application/octet-stream")
-            await self.send(job.replay())
+            await self.send(job.replay(self._is_closed))
 
 
 class _Sound(_Handler):
@@ -183,51 +191,50 @@ class _Sound(_Handler):
         job = self.job(number)
         if job is None:
             return
-        if job.report is None and "song" in job.request:
+        if "song" in job.request and not job.done and "whole" not in self.request.query_arguments:
             self.set_header("Content-Type", "audio/mpeg")
-            await self.send(job.sound())
+            await self.send(job.sound(self._is_closed))
         else:
-            await self.send_sound(job, "performance.mp3")
-
-    async def send_sound(self, job: Job, name: str) -> None:
-        """Answer with a sound of the report of a job that is done."""
-        if job.report is None:
-            self.refuse(404, "It is not there yet.")
-        else:
-            await self.send_file(job.report / name, "audio/mpeg")
+            await self.send_part(job, "performance.mp3")
 
 
-class _Wanted(_Sound):
+class _Wanted(_Handler):
     """Sends the sound of the score."""
 
     async def get(self, number: str) -> None:
         if (job := self.job(number)) is not None:
-            await self.send_sound(job, "score.mp3")
+            await self.send_part(job, "score.mp3")
 
 
 class _Files(_Handler):
     """Sends files of a report."""
 
+    for_sandboxed = True
+
     async def get(self, number: str, name: str) -> None:
         job = self.job(number)
         if job is None:
             return
+        if name in _PARTS:
+            await self.send_part(job, name)
+            return
+        await job.ended.wait()
         if name not in _KINDS or job.report is None or not (job.report / name).is_file():
             self.refuse(404, "It is not there.")
             return
         if name == "report.html":
-            # The page of a report has its script and its data in itself.
+            # The page of a report has its script in itself, and at most reads its own parts.
             self.set_header(
                 "Content-Security-Policy",
-                "default-src 'unsafe-inline' data: blob:; connect-src 'none'; "
-                "sandbox allow-scripts",
+                "default-src 'unsafe-inline' data: blob:; media-src 'self' data: blob:; "
+                "connect-src 'self' data: blob:; sandbox allow-scripts allow-downloads",
             )
         else:
             self.set_header("Content-Disposition", f'attachment; filename="{name}"')
         await self.send_file(job.report / name, _KINDS[name])
 
 
-class Stage:
+class Stage(Closing):
     """Serves the stage. Use it as a context manager.
 
     Attributes:
@@ -258,14 +265,14 @@ class Stage:
             self._server = LocalServer(
                 {
                     "": (
-                        _Page,
+                        Content,
                         {
                             "kind": "text/html; charset=utf-8",
                             "content": web_page("The stage - PianoMime", _BODY),
                         },
                     ),
                     **{
-                        name: (_Page, {"kind": script, "content": content})
+                        name: (Content, {"kind": script, "content": content})
                         for name, content in scripts.items()
                     },
                     "library": (_Listed, stage),
@@ -284,23 +291,18 @@ class Stage:
             self._folder.__exit__(None, None, None)
             raise
         self.url = self._server.url
+        self._out = out
+
+    def open_browser(self) -> None:
+        """Open the page in the user's browser, see `LocalServer.open_browser`."""
+        self._server.open_browser(self._out)
 
     def close(self) -> None:
         """End all that is going on."""
-        self.jobs.close()
+        # First what begins jobs.
         self._server.close()
+        self.jobs.close()
         self._folder.__exit__(None, None, None)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _request(asked: Any, library: Library) -> dict[str, Any]:
@@ -363,12 +365,9 @@ def _need_learned() -> None:
 
 def _range(asked: str | None, size: int) -> tuple[int, int]:
     """First byte and the one after the last of what is asked for; all of it if that is unclear."""
-    unit, _, span = (asked or "").partition("=")
-    first, _, last = span.partition("-")
-    if unit.strip() != "bytes" or not (first + last).isdigit():
-        return 0, size
+    span = _SPAN.fullmatch((asked or "").replace(" ", ""))
+    first, last = span.groups() if span else ("", "")
     if not first:
-        return max(size - int(last), 0), size
-    if int(first) >= size:
-        return 0, size
-    return int(first), min(int(last) + 1 if last else size, size)
+        return (max(size - int(last), 0) if last and int(last) else 0), size
+    start, stop = int(first), min(int(last) + 1 if last else size, size)
+    return (start, stop) if start < stop else (0, size)

@@ -81,7 +81,7 @@ class Hand:
             mujoco.mj_jacSite(self.model, self.data, jacobian[row], None, site)
         return points, jacobian
 
-    def points_along(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
+    def points_along(self, path: NDArray[np.floating]) -> NDArray[np.float64]:
         """The points, as `points` returns them, in many poses.
 
         Args:

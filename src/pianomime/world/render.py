@@ -9,13 +9,13 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from types import TracebackType
 
 import av
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pianomime.closing import Closing
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.mp4 import Mp4
@@ -64,7 +64,7 @@ class View:
     """Width and height [pixels], both even for H.264."""
 
 
-class Painter:
+class Painter(Closing):
     """Renders the world. Use it as a context manager, in the thread that made it.
 
     Attributes:
@@ -111,17 +111,6 @@ class Painter:
         self._gl.make_current()
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
-
-    def __enter__(self) -> Painter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def paint(self, qpos: ArrayLike, colours: ArrayLike) -> NDArray[np.uint8]:
         """Render one frame.

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable, Iterator
-from types import TracebackType
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.closing import Closing
 from pianomime.keyboard import KEYS
 
 _BLOCK = 2000
 """Frames of a block of the file, which is ordered by key: one read returns a key in all of them."""
 
 
-class LightRecord:
+class LightRecord(Closing):
     """Colours of Z patches of every key in T frames: written by frame, read by key.
 
     They are in an unnamed temporary file, which disappears when the record is closed.
@@ -106,19 +106,6 @@ class LightRecord:
     def close(self) -> None:
         """Delete the file."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        """Returns the record, which is closed at the end of the block."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Close the record."""
-        self.close()
 
     def _read(self, first: int, zone: int, key: int, keys: int) -> NDArray[np.uint8]:
         """(keys, n, 3) Colours from the block that begins with frame `first`."""

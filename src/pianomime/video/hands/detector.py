@@ -9,12 +9,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType, TracebackType
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.closing import Closing
 from pianomime.errors import InputError
 from pianomime.installation import install_command
 from pianomime.video.hands.sightings import Sighting
@@ -43,7 +44,7 @@ def check_mediapipe() -> None:
         pass
 
 
-class HandDetector:
+class HandDetector(Closing):
     """Detects up to two hands in each frame of one video. Use it as a context manager."""
 
     def __init__(self, model: Path) -> None:
@@ -67,15 +68,8 @@ class HandDetector:
         except (RuntimeError, ValueError) as error:
             raise InputError(f"{model}: MediaPipe cannot use this hand model") from error
 
-    def __enter__(self) -> HandDetector:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Close it."""
         self._landmarker.close()
 
     def detect(self, picture: NDArray[np.uint8], milliseconds: int) -> list[Sighting]:

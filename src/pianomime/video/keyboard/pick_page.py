@@ -11,15 +11,14 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 from string import Template
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from PIL import Image
 
+from pianomime.closing import Closing
 from pianomime.errors import InputError
 from pianomime.files import atomic
-from pianomime.local_server import LocalHandler, LocalServer
+from pianomime.local_server import Content, LocalHandler, LocalServer
 from pianomime.video.film.film import Film
 from pianomime.video.keyboard.points import SUGGESTED, parse_points
 from pianomime.web_page import web_page
@@ -53,17 +52,6 @@ player, left is the bass. At least four points are needed.</p>
 """)
 
 
-class _Content(LocalHandler):
-    """Answers with a content that does not change."""
-
-    def initialize(self, kind: str, content: bytes) -> None:
-        self._kind, self._content = kind, content
-
-    def get(self) -> None:
-        self.set_header("Content-Type", self._kind)
-        self.finish(self._content)
-
-
 class _Points(LocalHandler):
     """Saves the points that the page sends."""
 
@@ -91,7 +79,7 @@ class _Points(LocalHandler):
             self._done(saved)
 
 
-class PickPage:
+class PickPage(Closing):
     """Serves the page. Use it as a context manager.
 
     Attributes:
@@ -125,10 +113,10 @@ class PickPage:
         self._saved: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._server = LocalServer(
             {
-                "": (_Content, {"kind": "text/html; charset=utf-8", "content": html}),
-                "frame.png": (_Content, {"kind": "image/png", "content": file.getvalue()}),
+                "": (Content, {"kind": "text/html; charset=utf-8", "content": html}),
+                "frame.png": (Content, {"kind": "image/png", "content": file.getvalue()}),
                 "pick_page.js": (
-                    _Content,
+                    Content,
                     {"kind": "text/javascript; charset=utf-8", "content": script},
                 ),
                 "points": (
@@ -139,17 +127,15 @@ class PickPage:
             port,
         )
         self.url = self._server.url
+        self._folder = out.parent
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Close it."""
         self._server.close()
+
+    def open_browser(self) -> None:
+        """Open the page in the user's browser, see `LocalServer.open_browser`."""
+        self._server.open_browser(self._folder)
 
     def wait(self) -> str:
         """Wait until points are saved that determine where the keyboard is.
