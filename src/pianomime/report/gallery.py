@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from html import escape
@@ -18,25 +20,32 @@ import numpy as np
 
 from pianomime import __version__
 from pianomime.errors import InputError
+from pianomime.evaluation.evaluation import program_hash
 from pianomime.evaluation.measures import BODY, FRAMES, MORE_MUSIC, MUSIC
 from pianomime.evaluation.summary import Row
 from pianomime.file_names import file_names
-from pianomime.files import atomic, files_digest
+from pianomime.files import atomic, files_digest, staged
 from pianomime.keyboard import KEYS
 from pianomime.music import Score
 from pianomime.players.performance import Performance, is_performance
 from pianomime.progress import Progress, no_progress
-from pianomime.report.write import write_report
+from pianomime.replay import PageMissing, page_script
+from pianomime.report.page import beside
+from pianomime.report.write import FILES, write_report
 from pianomime.staging import scratch
 from pianomime.web_page import web_page
 from pianomime.workers import Answer, work
 
 INDEX = "index.html"
 PAGES = "performances"
-"""Folder of the pages in a site."""
+"""Folder in a site with a folder for each performance."""
+PAGE = "report.html"
+"""In that of a performance, with a MIDI file; what a long one's page needs lies beside it."""
 
 _WORKER = "pianomime.report.gallery:page_maker"
 _SAVED_BY_PLAY = "performance"
+_CARD_FILE = "card.json"
+"""Beside a page: what it was made of, and what the index says of it."""
 _SHOWN = MUSIC[0], MUSIC[1], MUSIC[4], MUSIC[5]
 """Measures on every card; the others are shown when they are sorted by."""
 _SORTED_BY = tuple(measure for measure in (*MUSIC, *FRAMES, *MORE_MUSIC, *BODY))
@@ -51,11 +60,14 @@ select, input, button {
 }
 .cards { display: grid; gap: 1rem; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); }
 .card {
-  display: flex; flex-direction: column; gap: .5rem; background: var(--paper); color: inherit;
-  border: 1px solid var(--line); border-radius: 14px; padding: 1rem; text-decoration: none;
+  position: relative; display: flex; flex-direction: column; gap: .5rem;
+  background: var(--paper); border: 1px solid var(--line); border-radius: 14px; padding: 1rem;
 }
-.card:hover, .card:focus-visible { border-color: var(--left); }
-.card h2 { color: var(--text); font-size: 1.05rem; margin: 0; overflow-wrap: anywhere; }
+.card:hover, .card:focus-within { border-color: var(--left); }
+.card h2 { font-size: 1.05rem; margin: 0; overflow-wrap: anywhere; }
+.card h2 a { color: var(--text); text-decoration: none; }
+.card h2 a::after { content: ""; position: absolute; inset: 0; border-radius: 14px; }
+.card .midi { position: relative; align-self: end; color: var(--faint); font-size: .85rem; }
 .card svg { width: 100%; height: 88px; margin-top: auto; }
 .card dl {
   display: grid; grid-template-columns: 1fr auto; gap: .1rem .8rem; margin: 0; font-size: .9rem;
@@ -78,12 +90,13 @@ $cards</div>
 <footer>Made by PianoMime $version.</footer>
 """)
 _CARD = Template("""\
-<a class="card" href="$address" data-values="$values">
-<h2>$song</h2>
+<article class="card" data-values="$values">
+<h2><a href="$folder/$page">$song</a></h2>
 <small>$player, effort $effort, world $world, $seconds s</small>
 <svg viewBox="0 0 $width $height" preserveAspectRatio="none" aria-hidden="true">$roll</svg>
 <dl>$measures</dl>
-</a>
+<a class="midi" href="$folder/$midi" download>MIDI</a>
+</article>
 """)
 
 
@@ -95,12 +108,13 @@ def performances_of(results: Sequence[Path]) -> list[Path]:
             deeper folders count.
 
     Returns:
-        The files in the order given, those of a folder in that of their names, each once.
+        The files in the order given, those of a folder in that of their names; each once, however
+        often and by whatever path it is given.
 
     Raises:
         InputError: something given is not there, or holds no performance.
     """
-    found: dict[Path, None] = {}
+    found: dict[Path, Path] = {}
     for path in results:
         if path.is_dir():
             inside = [file for file in sorted(path.rglob("*.npz")) if is_performance(file)]
@@ -110,8 +124,9 @@ def performances_of(results: Sequence[Path]) -> list[Path]:
             inside = [path]
         else:
             raise InputError(f"{path}: there is no such file or folder")
-        found |= dict.fromkeys(inside)
-    return list(found)
+        for file in inside:
+            found.setdefault(file.resolve(), file)
+    return list(found.values())
 
 
 def write_gallery(
@@ -122,13 +137,13 @@ def write_gallery(
     progress: Progress = no_progress,
     note: Callable[[str], None] = print,
 ) -> list[Row]:
-    """Write a site: an index, and a page for each performance, which holds all that it shows.
+    """Write a site: an index, and a folder for each performance with its page and its MIDI file.
 
-    Pages that are there already, of the same performance and made by the same version, are not made
-    again, so a run that was stopped goes on where it was.
+    Pages that are there already, of the same performance and made by the same program with the same
+    script, are not made again, so a run that was stopped goes on where it was.
 
     Args:
-        performances: files of performances.
+        performances: files of performances, each once.
         site: folder of the site; made if it is not there.
         title: heading of the index.
         jobs: how many pages are made at a time.
@@ -137,7 +152,7 @@ def write_gallery(
             lack their hands.
 
     Returns:
-        The summaries of the performances shown, in the order of the cards.
+        The summaries of the performances shown, in the order given.
 
     Raises:
         InputError: none could be shown.
@@ -146,21 +161,24 @@ def write_gallery(
     pages = site / PAGES
     pages.mkdir(parents=True, exist_ok=True)
     names = dict(zip(performances, _names(performances), strict=True))
+    made_by = _made_by()
     cards: dict[Path, Row] = {}
+    remarks: dict[str, None] = {}
     waiting = []
     for path in performances:
-        made = _made(pages / f"{names[path]}.json", path)
+        made = _made(pages / names[path], path, made_by)
         if made is None:
             waiting.append(path)
         else:
+            remarks |= dict.fromkeys(made["notes"])
             cards[path] = made
     progress("pages", len(cards), len(performances))
-    remarks: dict[str, None] = {}
 
     def request(path: Path) -> dict[str, str]:
         return {"performance": os.fspath(path), "name": names[path]}
 
-    with closing(work(_WORKER, waiting, jobs, os.fspath(pages), request)) as done:
+    setup = {"pages": os.fspath(pages), "made_by": made_by}
+    with closing(work(_WORKER, waiting, jobs, setup, request)) as done:
         for path, row in done:
             if "error" in row:
                 error = str(row["error"])
@@ -180,26 +198,31 @@ def write_gallery(
     return [card["row"] for _, card in shown]
 
 
-def page_maker(pages: str) -> Answer:
+def page_maker(setup: dict[str, str]) -> Answer:
     """What makes the pages of a gallery, for `pianomime.workers.work`.
 
     Args:
-        pages: folder of the pages.
+        setup: `pages`, the folder of them, and `made_by`, which tells what makes them.
     """
-    folder = Path(pages)
+    pages, made_by = Path(setup["pages"]), setup["made_by"]
 
     def answer(request: dict[str, str]) -> Row:
         path, name = Path(request["performance"]), request["name"]
+        # Not `download="..."` alone: browsers heed that only on a site, not on a disk.
+        folder, midi = pages / name, f"{name}.mid"
+        of = _digest(path, made_by)
         performance = Performance.load(path)
         notes: list[str] = []
-        with scratch() as made:
+        with scratch() as made, staged(folder, (*FILES, midi, _CARD_FILE)) as inside:
             row = write_report(performance, made, False, no_progress, notes.append)
-            for kind, file in (("html", "report.html"), ("mid", "performance.mid")):
-                with atomic(folder / f"{name}.{kind}") as temporary:
-                    shutil.copy(made / file, temporary)
-        card = {"of": _digest(path), "row": row, "roll": _roll(performance), "notes": notes}
+            shutil.copy(made / "performance.mid", inside / midi)
+            for part in (PAGE, *beside(made / PAGE)):
+                shutil.copy(made / part, inside)
+            parts = [file.name for file in inside.iterdir()]
+        roll = _roll(performance)
+        card = {"of": of, "parts": parts, "row": row, "roll": roll, "notes": notes}
         # Last, so that what it stands for is there.
-        with atomic(folder / f"{name}.json") as temporary:
+        with atomic(folder / _CARD_FILE) as temporary:
             temporary.write_text(json.dumps(card, ensure_ascii=False), encoding="utf-8")
         return card
 
@@ -207,28 +230,40 @@ def page_maker(pages: str) -> Answer:
 
 
 def _names(performances: Sequence[Path]) -> list[str]:
-    """A name for the page of each performance; one that `play` wrote has that of its folder."""
+    """A name for the folder of each performance; one that `play` wrote has that of its folder."""
     absolute = [path.resolve() for path in performances]
-    named = [
-        path.parent if path.stem == _SAVED_BY_PLAY else path.with_suffix("") for path in absolute
+    # With a suffix, which `file_names` takes off.
+    short = [
+        Path(f"{path.parent}.npz") if path.stem == _SAVED_BY_PLAY else path for path in absolute
     ]
+    # Beside X/performance.npz there may be X.npz.
+    count = Counter(short)
+    named = [name if count[name] == 1 else path for name, path in zip(short, absolute, strict=True)]
     common = Path(os.path.commonpath([path.parent for path in named]))
-    return file_names([Path(f"{path.relative_to(common)}.npz") for path in named])
+    return file_names([path.relative_to(common) for path in named])
 
 
-def _digest(performance: Path) -> str:
-    return f"{__version__} {files_digest([performance])}"
+def _made_by() -> str:
+    """Changes with all that decides what a page of a performance is like."""
+    try:
+        script = page_script()
+    except PageMissing:  # It may be there next time.
+        script = ""
+    return f"{program_hash()} {hashlib.sha256(script.encode()).hexdigest()}"
 
 
-def _made(file: Path, performance: Path) -> Row | None:
+def _digest(performance: Path, made_by: str) -> str:
+    return f"{made_by} {files_digest([performance])}"
+
+
+def _made(folder: Path, performance: Path, made_by: str) -> Row | None:
     """The card of a page that was made of this performance before, or None."""
     try:
-        card: Any = json.loads(file.read_text(encoding="utf-8"))
-        whole = card["of"] == _digest(performance) and file.with_suffix(".html").exists()
+        card: Any = json.loads((folder / _CARD_FILE).read_text(encoding="utf-8"))
+        there = all((folder / name).is_file() for name in card["parts"])
+        return card if there and card["of"] == _digest(performance, made_by) else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    # Where the script of the page was not there, it may be now.
-    return card if whole and not card["notes"] else None
 
 
 def _roll(performance: Performance) -> list[str]:
@@ -269,7 +304,9 @@ def _card(name: str, card: Row) -> str:
     colours = ("--left", "--right", "--faint")
     values = {measure.label: measure.show(row) for measure in _SORTED_BY}
     return _CARD.substitute(
-        address=f"{PAGES}/{quote(name)}.html",
+        folder=f"{PAGES}/{quote(name)}",
+        page=PAGE,
+        midi=f"{quote(name)}.mid",
         values=escape(json.dumps({"song": row["song"], **values}, ensure_ascii=False)),
         song=escape(str(row["song"])),
         player=escape(str(row["player"])),

@@ -185,3 +185,14 @@ def source(kind: str, file: Path) -> str:
     if file.stat().st_size > MOST_EMBEDDED:
         return quote(file.name)
     return data_url(kind, file.read_bytes())
+
+
+def beside(page: Path) -> list[str]:
+    """Names of the files in the folder of a page that it needs beside it.
+
+    Args:
+        page: the file of a page, see `source`.
+    """
+    html = page.read_text(encoding="utf-8")
+    names = sorted(file.name for file in page.parent.iterdir())
+    return [name for name in names if f'="{quote(name)}"' in html]
