@@ -174,6 +174,13 @@ def test_cards_are_sorted_and_found(site: Path) -> None:
         assert titles.all_text_contents() == [HOSTILE, "a", "b"]
         values = [float(value) for value in page.locator("dd.sorted").all_text_contents()]
         assert values == sorted(values, reverse=True)
+        page.get_by_role("button", name="largest first").click()
+        assert titles.all_text_contents() == ["b", "a", HOSTILE]
+        page.get_by_role("button", name="smallest first").click()
+        assert titles.all_text_contents() == [HOSTILE, "a", "b"]
+        page.select_option("select", "song")
+        page.get_by_role("button", name="A to Z").click()
+        assert titles.all_text_contents() == ["b", "a", HOSTILE]
         page.fill("input", "SCRIPT")
         assert titles.all_text_contents() == [HOSTILE]
         assert page.title() == "<Études>"

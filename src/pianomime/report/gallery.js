@@ -8,26 +8,34 @@
     values: JSON.parse(element.dataset.values),
     text: element.textContent.toLowerCase(),
   }));
+  const { measure, direction, find } = form.elements;
+  // Songs begin with A, and measures with the largest.
+  let reversed = false;
   // Of several numbers, as of an error's percentiles, the middle one counts.
   const number = (text) => {
     const numbers = text.match(/-?\d+(\.\d+)?/g);
-    return numbers ? Number(numbers[Math.floor(numbers.length / 2)]) : -Infinity;
+    return numbers ? Number(numbers[Math.floor(numbers.length / 2)]) : null;
+  };
+  const compare = (one, other) => {
+    const sign = reversed ? -1 : 1;
+    const [a, b] = [one.values[measure.value], other.values[measure.value]];
+    if (measure.value === "song") return sign * a.localeCompare(b);
+    const [x, y] = [number(a), number(b)];
+    // What was not measured comes last both ways.
+    if (x === null || y === null) return (x === null) - (y === null);
+    return sign * (y - x);
   };
   const show = () => {
-    const measure = form.elements.measure.value;
-    const sought = form.elements.find.value.trim().toLowerCase();
-    const value = (card) => card.values[measure];
-    cards.sort(
-      measure === "song"
-        ? (a, b) => value(a).localeCompare(value(b))
-        : (a, b) => number(value(b)) - number(value(a)),
-    );
+    const name = measure.value;
+    const sought = find.value.trim().toLowerCase();
+    const ways = name === "song" ? ["A to Z", "Z to A"] : ["largest first", "smallest first"];
+    direction.textContent = ways[Number(reversed)];
+    cards.sort(compare);
     for (const { element, values, text } of cards) {
       element.hidden = !text.includes(sought);
-      element.style.display = element.hidden ? "none" : "";
       element.querySelectorAll(".sorted").forEach((part) => part.remove());
-      if (measure !== "song") {
-        for (const [tag, content] of [["dt", measure], ["dd", values[measure]]]) {
+      if (name !== "song") {
+        for (const [tag, content] of [["dt", name], ["dd", values[name]]]) {
           const part = document.createElement(tag);
           part.className = "sorted";
           part.textContent = content;
@@ -38,6 +46,15 @@
     }
   };
   form.hidden = false;
-  form.addEventListener("input", show);
+  show();
+  measure.addEventListener("input", () => {
+    reversed = false;
+    show();
+  });
+  direction.addEventListener("click", () => {
+    reversed = !reversed;
+    show();
+  });
+  find.addEventListener("input", show);
   form.addEventListener("submit", (event) => event.preventDefault());
 })();

@@ -46,13 +46,18 @@ _WORKER = "pianomime.report.gallery:page_maker"
 _SAVED_BY_PLAY = "performance"
 _CARD_FILE = "card.json"
 """Beside a page: what it was made of, and what the index says of it."""
-_SHOWN = MUSIC[0], MUSIC[1], MUSIC[4], MUSIC[5]
+_SORTED_BY = *MUSIC, *FRAMES, *MORE_MUSIC, *BODY
+_NAMED = {measure.name: measure for measure in _SORTED_BY}
+_SHOWN = tuple(
+    _NAMED[f"music.{name}"]
+    for name in ("note_f1_50", "note_f1_25", "velocity_f1", "phantoms_per_minute")
+)
 """Measures on every card; the others are shown when they are sorted by."""
-_SORTED_BY = tuple(measure for measure in (*MUSIC, *FRAMES, *MORE_MUSIC, *BODY))
 _ROLL = 320, KEYS
 """Width and height of the piano roll on a card, in its own units."""
 
 _STYLE = """\
+[hidden] { display: none !important; }
 form { display: flex; flex-wrap: wrap; gap: .7rem; align-items: center; margin: 0 0 1.2rem; }
 select, input, button {
   font: inherit; color: inherit; background: var(--paper); border: 1px solid var(--line);
@@ -83,6 +88,7 @@ _BODY = Template("""\
 notes were missed.</p>
 <form id="order" hidden>
 <label>Sort by <select name="measure">$options</select></label>
+<button name="direction" type="button"></button>
 <label>Find <input name="find" type="search"></label>
 </form>
 <div class="cards">
