@@ -78,6 +78,32 @@ def test_where_the_report_goes(name: str, out: str, performance: Performance) ->
     assert Performance.load(name).score.remarks == performance.score.remarks
 
 
+def test_a_film_stays_with_its_performance(
+    performance: Performance, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def report(name: str) -> tuple[list[str], bool]:
+        """What is said of the film, and whether the page shows it."""
+        main(["report", name, "-o", "shown"])
+        told = [line for line in capsys.readouterr().out.splitlines() if "performance.mp4" in line]
+        page = Path("shown", "report.html").read_text(encoding="utf-8")
+        return told, "data:video/mp4" in page
+
+    performance.save("one.npz")
+    made_up.performance(performance.score, mistakes=0.5).save("other.npz")
+    assert report("one.npz") == ([], False)
+    film = Path("shown", "performance.mp4")
+    film.write_bytes(b"a film")
+    told, shown = report("one.npz")
+    assert "stays" in told[0]
+    assert film.read_bytes() == b"a film"
+    assert shown
+    told, shown = report("other.npz")
+    assert "removed" in told[0]
+    assert not film.exists()
+    assert not shown
+    assert report("other.npz") == ([], False)
+
+
 def test_what_is_no_performance_is_one_line(
     performance: Performance, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -40,7 +40,8 @@ class Report:
     """Folder for the report; by default that of a performance.npz, and for a file of another name a
     folder of that name beside it."""
     video: bool = False
-    """Render a film of 60 pictures a second too, where this machine can."""
+    """Render a film of 60 pictures a second too, where this machine can; one in OUT that is of this
+    performance stays without it."""
 
     def run(self) -> None:
         """Read the performance and write the report.
@@ -84,7 +85,9 @@ def make_report(perform: Callable[[Progress], Performance], out: Path, video: bo
 
     notes: list[str] = []
     with staged(out, FILES) as folder, bars() as progress:
-        row = write_report(perform(progress), folder, video, progress=progress, note=notes.append)
+        row = write_report(
+            perform(progress), folder, video, progress=progress, note=notes.append, earlier=out
+        )
     Console().print(_table(row))
     for note in notes:
         print(shown(note))

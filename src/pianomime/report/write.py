@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from pianomime import __version__
+from pianomime.archive import read_arrays
+from pianomime.errors import InputError
 from pianomime.evaluation.summary import Row, summarize
 from pianomime.keyboard import KEYS
 from pianomime.music import Score, match_notes
@@ -25,6 +28,8 @@ from pianomime.replay import PageMissing, Poses, page_script, write_replay
 from pianomime.report.mp3 import write_mp3
 from pianomime.report.page import REPLAY_TYPE, page, source
 from pianomime.report.picture import draw
+from pianomime.schema import Field
+from pianomime.seal import SEAL
 from pianomime.world.render import RenderUnavailable, write_video
 from pianomime.world.scene_look import key_colours
 
@@ -45,7 +50,7 @@ FILES = (
 but of long pieces."""
 
 _SOUNDS = ("performance.mp3", "score.mp3")
-_REPLAY = "performance.replay.gz"
+_PERFORMANCE, _FILM, _REPLAY = "performance.npz", "performance.mp4", "performance.replay.gz"
 _FILM_FPS = 60
 _PICTURES = {"piano_roll.png": LIGHT, "piano_roll_dark.png": DARK}
 _ENCODING = 3
@@ -59,6 +64,7 @@ def write_report(
     progress: Progress,
     note: Callable[[str], None],
     keep_parts: bool = False,
+    earlier: Path | None = None,
 ) -> Row:
     """Write the files of a report, `FILES`.
 
@@ -69,6 +75,8 @@ def write_report(
         progress: called in the phases "saving", "sound", "pictures", "rendering" and "page".
         note: called with one line that says what could not be made and why.
         keep_parts: leave sounds and replay beside the page also where it holds them.
+        earlier: folder of a report that this one will replace. Its film becomes part of this one if
+            it is of the same performance and none is rendered.
 
     Returns:
         The summary, as in `report.json`.
@@ -78,7 +86,7 @@ def write_report(
     row = summarize(performance, poses.of(motion(performance)))
     write_replay(folder / _REPLAY, performance, row, poses)
     played = performance.played()
-    performance.save(folder / "performance.npz")
+    performance.save(folder / _PERFORMANCE)
     played.to_midi(folder / "performance.mid")
     with telling(progress):
         _write_sounds(played, performance.score, folder)
@@ -91,7 +99,9 @@ def write_report(
             _write_film(performance, poses, folder, progress)
         except RenderUnavailable as error:
             note(str(error))
-    film = folder / "performance.mp4"
+    film = folder / _FILM
+    if earlier is not None and not film.exists():
+        _keep_film(earlier, folder, note)
     progress("page", 0, 0)
     try:
         script = page_script()
@@ -121,6 +131,25 @@ def write_report(
         json.dumps(row, indent=2, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
     )
     return row
+
+
+def _keep_film(earlier: Path, folder: Path, note: Callable[[str], None]) -> None:
+    """Take over the film of an earlier report, which takes long to render, if it is still true."""
+    if not (earlier / _FILM).is_file():
+        return
+    if _seal(earlier / _PERFORMANCE) == _seal(folder / _PERFORMANCE):
+        shutil.copy(earlier / _FILM, folder)
+        note(f"{_FILM} is of this performance, and stays")
+    else:
+        note(f"{_FILM} was of another performance, and is removed")
+
+
+def _seal(performance: Path) -> str | None:
+    """The seal of a saved performance; None if there is none."""
+    try:
+        return str(read_arrays(performance, "a performance", {SEAL: Field("text")})[SEAL])
+    except (InputError, OSError):
+        return None
 
 
 def _write_sounds(played: Score, wanted: Score, folder: Path) -> None:
@@ -165,7 +194,7 @@ def _write_film(performance: Performance, poses: Poses, folder: Path, progress: 
 
     with WavFile(folder / "performance.wav") as audio:
         write_video(
-            folder / "performance.mp4",
+            folder / _FILM,
             _FilmPoses(poses, pictures),
             sounding,
             audio,
