@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Any
 
@@ -20,7 +21,6 @@ from pianomime.players.receding_horizon import (
 )
 from pianomime.track.keystroke import KeystrokeController, KeystrokeTracker
 from pianomime.world import World
-import itertools
 
 SHORT = HorizonConfig(first=1.0, longest=2.0, ahead=2.0)
 

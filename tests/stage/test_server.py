@@ -24,7 +24,6 @@ from pianomime.keyboard import LEAD_IN_SECONDS
 from pianomime.music.excerpt import excerpt
 from pianomime.stage.jobs import Job
 from pianomime.stage.library import Library
-from pianomime.stage.playing import WholeParts
 from pianomime.stage.server import LARGEST_SONG, Stage
 
 SECONDS = 2.0
