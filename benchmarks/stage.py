@@ -23,6 +23,7 @@ sys.path.insert(0, str(common.ROOT / "tests"))
 
 from browser import Browsers, browsers
 from pianomime import Score, excerpt, songs
+from pianomime.keyboard import LEAD_IN_SECONDS
 from pianomime.stage.server import Stage
 
 SONGS = ("bach-prelude-c", "beethoven-ode-to-joy", "petzold-minuet-g")
@@ -71,7 +72,7 @@ def first_sound(started: Browsers, song: str, folder: Path) -> float:
         time.sleep(STANDS)
         began = time.perf_counter()
         page.set_input_files("input[type=file]", path)
-        page.wait_for_function(f"{REPLAY}.currentTime > 0.02", polling=20, timeout=120_000)
+        page.wait_for_function(f"{REPLAY}.currentTime > {LEAD_IN_SECONDS + 0.02}", polling=20, timeout=120_000)
         return time.perf_counter() - began
 
 

@@ -131,6 +131,25 @@ def test_the_keyboard_alone_plays_and_seeks(page: Any) -> None:
     assert page.evaluate(f"{REPLAY}.currentTime") == pytest.approx(stopped + 1 / 60, abs=0.02)
 
 
+def test_a_key_under_the_pointer_is_told_of(page: Any) -> None:
+    page.keyboard.press("3")  # seen from above
+    page.wait_for_timeout(1000)
+    box = page.locator("pianomime-replay canvas").first.bounding_box()
+    tip = page.locator("pianomime-replay .view .tip")
+    told = set()
+    for place in range(1, 24):
+        page.mouse.move(box["x"] + place / 24 * box["width"], box["y"] + 0.42 * box["height"])
+        page.wait_for_timeout(60)
+        if "seen" in (tip.get_attribute("class") or ""):
+            told.add((tip.text_content() or "").split()[0])
+    assert len(told) > 5
+    page.mouse.move(0, 0)
+    page.wait_for_function(
+        "!document.querySelector('pianomime-replay').shadowRoot"
+        ".querySelector('.view .tip').classList.contains('seen')"
+    )
+
+
 def test_without_webgl_the_picture_is_shown_and_a_line_says_why(
     started: Browsers, report: str
 ) -> None:

@@ -236,12 +236,12 @@ def test_files_are_those_of_the_report_alone(stage: Stage) -> None:
 def test_a_page_has_one_job_and_another_page_its_own(stage: Stage) -> None:
     client, other = Client(stage), Client(stage, "two")
     first = client.play(effort=3, seconds=None)
-    apart = other.play(seconds=1.0)
+    apart = other.open("GET", f"jobs/{other.play(seconds=1.0)}/replay")
     replay = client.open("GET", f"jobs/{first}/replay")
     second = client.play(seconds=1.0)
     assert "Stopped" in last(blocks(replay.read()), "FAIL")["message"]
-    for page, job in ((client, second), (other, apart)):
-        assert blocks(page.open("GET", f"jobs/{job}/replay").read())[-1][0] == "DONE"
+    for answer in (client.open("GET", f"jobs/{second}/replay"), apart):
+        assert blocks(answer.read())[-1][0] == "DONE"
 
 
 def test_what_is_stopped_ends_its_process_and_leaves_nothing(stage: Stage, tmp_path: Path) -> None:

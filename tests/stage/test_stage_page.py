@@ -50,8 +50,8 @@ def song(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-def open_page(chromium: Any, stage: Stage) -> Any:
-    page = chromium.new_page(viewport={"width": 1000, "height": 800})
+def open_page(chromium: Any, stage: Stage, **more: Any) -> Any:
+    page = chromium.new_page(viewport={"width": 1000, "height": 800}, **more)
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
@@ -60,15 +60,17 @@ def open_page(chromium: Any, stage: Stage) -> Any:
     return page
 
 
-def drop(page: Any, name: str, content: bytes) -> None:
+def drop(page: Any, name: str, content: bytes, folder: bool = False) -> None:
     page.evaluate(
-        """([name, bytes]) => {
+        """([name, bytes, folder]) => {
           const data = new DataTransfer();
           data.items.add(new File([new Uint8Array(bytes)], name));
+          // No script can make a folder that is dropped.
+          DataTransferItem.prototype.webkitGetAsEntry = () => ({ isDirectory: folder });
           const more = { dataTransfer: data, bubbles: true, cancelable: true };
           document.body.dispatchEvent(new DragEvent("drop", more));
         }""",
-        [name, list(content)],
+        [name, list(content), folder],
     )
 
 
@@ -108,9 +110,15 @@ def test_two_are_compared_on_one_clock(chromium: Any, stage: Stage, song: bytes)
     page.get_by_label("World").select_option("solid")
     page.get_by_role("button", name="Try again").click()
     wait(page, f"{SECOND}.state === 'done'")
+    assert page.locator(".show > table td").count() == 2 * page.locator(".show > table tr").count()
     page.evaluate(f"{FIRST}.currentTime = 1.25")
     assert page.evaluate(f"{SECOND}.currentTime") == 1.25
-    assert page.locator(".show > table td").count() == 2 * page.locator(".show > table tr").count()
+    # What is taken away does not come back.
+    compare = page.get_by_role("button", name="Compare")
+    compare.click()
+    compare.click()
+    assert page.evaluate(f"[{SECOND}.state, {SECOND}.head]") == ["empty", None]
+    assert page.evaluate(f"{FIRST}.state") == "done"
     assert not page.wrong
 
 
@@ -131,6 +139,61 @@ def test_bad_files_are_one_line_on_the_page(chromium: Any, stage: Stage, song: b
     wait(page, f"{FIRST}.state === 'done'")
     # A request that is refused is told in the console by the browser itself.
     assert all("status of 400" in wrong for wrong in page.wrong)
+
+
+def test_a_folder_is_told_and_several_files_are_all_taken(
+    chromium: Any, stage: Stage, song: bytes, tmp_path: Path
+) -> None:
+    page = open_page(chromium, stage)
+    message = page.locator(".stage > .message:visible")
+    drop(page, "my songs", b"", folder=True)
+    message.filter(has_text="my songs is a folder").wait_for()
+    names = ["one.mid", "two.mid", "no.mid"]
+    for name in names:
+        (tmp_path / name).write_bytes(song if name != "no.mid" else b"no music")
+    page.set_input_files("input[type=file]", [tmp_path / name for name in names])
+    message.filter(has_text="2 songs are in the library now").filter(has_text="no.mid").wait_for()
+    wait(page, f"{FIRST}.state === 'done'")
+    # What was said stays until something else is done.
+    assert message.filter(has_text="2 songs").count() == 1
+    for name in ("one", "two"):
+        assert page.locator("nav ul").first.get_by_text(name, exact=True).count() == 1
+    page.get_by_role("button", name="Try again").click()
+    assert message.count() == 0
+
+
+def test_nothing_moves_by_itself_where_that_is_not_wanted(
+    chromium: Any, stage: Stage, song: bytes
+) -> None:
+    page = open_page(chromium, stage, reduced_motion="reduce")
+    drop(page, "song.mid", song)
+    wait(page, f"{FIRST}.state === 'done'")
+    page.get_by_role("button", name="Compare").click()
+    page.get_by_role("button", name="Try again").click()
+    wait(page, f"{SECOND}.state === 'done'")
+    assert page.evaluate(f"[{FIRST}.playing, {SECOND}.playing]") == [False, False]
+
+
+def test_playing_begins_long_before_it_is_all_made(chromium: Any, stage: Stage) -> None:
+    page = open_page(chromium, stage)
+    page.get_by_label("Length").select_option("1")
+    page.get_by_role("button", name="bach-prelude-c").click()
+    wait(page, f"{FIRST}.currentTime > 0.6")
+    assert page.evaluate(f"{FIRST}.state") == "growing"
+    assert page.evaluate(f"{FIRST}.available") < 0.5 * page.evaluate(f"{FIRST}.duration")
+    page.get_by_role("button", name="Stop").click()
+
+
+def test_a_connection_that_is_lost_leaves_what_has_come(chromium: Any, tmp_path: Path) -> None:
+    with Stage(tmp_path / "out", []) as stage:
+        page = open_page(chromium, stage)
+        page.get_by_label("Length").select_option("1")
+        page.get_by_role("button", name="bach-prelude-c").click()
+        wait(page, f"{FIRST}.available > 1")
+    wait(page, f"{FIRST}.state === 'failed'")
+    page.get_by_text("The connection was lost").wait_for()
+    page.evaluate(f"{FIRST}.currentTime = 0.8")
+    assert page.evaluate(f"{FIRST}.bodyPose('world', 0.8).pos") == [0, 0, 0]
 
 
 def test_two_tabs_play_apart_and_stop_alone(chromium: Any, stage: Stage, song: bytes) -> None:
