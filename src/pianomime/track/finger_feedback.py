@@ -12,19 +12,20 @@ _LIFT_DAMPING = 0.01
 def reach_joints(
     jacobian: NDArray[np.float64], error: NDArray[np.float64], limit: float, damping: float
 ) -> NDArray[np.float64]:
-    """(27,) Joint displacement that reduces the errors of the fingertips [rad, m].
+    """(..., 27) Joint displacement that reduces the errors of the fingertips of hands [rad, m].
 
     Args:
-        jacobian: (5, 3, 27) of the fingertips.
-        error: (5, 3) from where they are to where they should be [m].
+        jacobian: (..., 5, 3, 27) of the fingertips.
+        error: (..., 5, 3) from where they are to where they should be [m].
         limit: errors are clipped to this length [m].
         damping: of the inversion [m/rad].
     """
-    size = np.linalg.norm(error, axis=1, keepdims=True)
+    size = np.linalg.norm(error, axis=-1, keepdims=True)
     error = error * np.minimum(1.0, limit / np.maximum(size, 1e-9))
-    gram = jacobian @ jacobian.transpose(0, 2, 1) + damping**2 * np.eye(3)
+    transposed = jacobian.swapaxes(-1, -2)
+    gram = jacobian @ transposed + damping**2 * np.eye(3)
     force = np.linalg.solve(gram, error[..., None])
-    move: NDArray[np.float64] = (jacobian.transpose(0, 2, 1) @ force).sum(axis=0)[:, 0]
+    move: NDArray[np.float64] = (transposed @ force).sum(axis=-3)[..., 0]
     return move
 
 

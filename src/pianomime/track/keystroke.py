@@ -150,9 +150,11 @@ class KeystrokeController:
         self.x = plan.fingertips[frame, strikes.hand, 1 + strikes.finger, 0]
         hinge = key_centres()[strikes.key, 0] - key_half_sizes()[strikes.key, 0]
         self._reach = self.x - hinge
+        # The last is of fingers that strike nothing, whose strike is -1.
+        self._centre = np.append(key_centres()[strikes.key, 1], np.nan)
         self._strike_with(Corrections.none(len(strikes)))
         steps = Steps("paths", len(hands) * config.path.iterations * len(plan))
-        self._paths = self._coarse_paths(steps)
+        self._paths = np.stack(self._coarse_paths(steps))
         steps = Steps("controls", self._steps(config.refine))
         self._aim(config.refine, steps.advance)
 
@@ -217,7 +219,7 @@ class KeystrokeController:
             weights[:, 1:][self._strokes.tight[:, index]] /= share
             lately = self._before[index][[-2, -1]]
             problems.append(self._problem(index, targets, weights, config, lately, self._dt))
-        self._paths = smooth_paths(problems, advance, [path[1:] for path in self._paths])
+        self._paths = np.stack(smooth_paths(problems, advance, [path[1:] for path in self._paths]))
         for index, (hand, path) in enumerate(zip(self._hands, self._paths, strict=True)):
             self._follow(index, hand, path)
             advance(count)
@@ -239,28 +241,32 @@ class KeystrokeController:
         """
         config, qpos = self.config, world.qpos
         ctrl: NDArray[np.float64] = self._feedforward[frame].copy()
+        here = np.stack([qpos[hand.joints] for hand in self._hands])
+        found = [
+            hand.points_and_jacobian(pose) for hand, pose in zip(self._hands, here, strict=True)
+        ]
+        tips = np.stack([points[1:] for points, _ in found])
+        jacobian = np.stack([jacobian[1:] for _, jacobian in found])
+        # A finger corrects itself, and only what striking fingers have in common is left to the
+        # forearm: moving it moves all of them.
+        jacobian[..., : LAYOUT.arm_joints] = 0.0
+        error = self._tips[:, frame] - tips
+        strike = self._strokes.strike[frame]
+        strikes = strike >= 0
+        arrives = self._tips[:, frame + 1, :, 1] - error[..., 1]
+        beside = np.abs(arrives - self._centre[strike]) > config.astray
+        low = tips[..., 2] < resting_height(tips[..., 0]) - config.sunk
+        lift = np.where(strikes, beside, low)
+        move = self._gain * (self._paths[:, frame] - here)
+        reach = reach_joints(jacobian, error, config.tip_error, config.tip_damping)
+        move += config.tip_feedback * reach
+        along = error[..., 1].clip(-config.tip_error, config.tip_error)
+        press = np.where((strikes & ~lift)[..., None], self._press[frame], 0.0).sum(axis=1)
         for index, hand in enumerate(self._hands):
-            here = qpos[hand.joints]
-            points, jacobian = hand.points_and_jacobian(here)
-            tips, jacobian = points[1:], jacobian[1:]
-            # A finger corrects itself, and only what striking fingers have in common is left to the
-            # forearm: moving it moves all of them.
-            jacobian[..., : LAYOUT.arm_joints] = 0.0
-            error = self._tips[index, frame] - tips
-            strike = self._strokes.strike[frame, index]
-            strikes = strike >= 0
-            arrives = self._tips[index, frame + 1, :, 1] - error[:, 1]
-            away = np.abs(arrives[strikes] - key_centres()[self.strikes.key[strike[strikes]], 1])
-            lift = tips[:, 2] < resting_height(tips[:, 0]) - config.sunk
-            lift[strikes] = away > config.astray
-            move = self._gain * (self._paths[index][frame] - here)
-            reach = reach_joints(jacobian, error, config.tip_error, config.tip_damping)
-            move += config.tip_feedback * reach
-            along = error[strikes, 1].clip(-config.tip_error, config.tip_error)
-            move[LAYOUT.slide] += shared(along)
-            move += lift_joints(jacobian[lift, 2], config.clear)
-            press = self._press[frame, index][strikes & ~lift].sum(axis=0)
-            ctrl[hand.actuators] += hand.to_ctrl @ move + press
+            move[index, LAYOUT.slide] += shared(along[index, strikes[index]])
+            if lift[index].any():
+                move[index] += lift_joints(jacobian[index, lift[index], 2], config.clear)
+            ctrl[hand.actuators] += hand.to_ctrl @ move[index] + press[index]
         return ctrl
 
     @property
