@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from pianomime.players.motion import motion
 from pianomime.players.performance import Performance
 from pianomime.progress import Progress, Steps, telling
 from pianomime.replay import PageMissing, Poses, page_script, write_replay
+from pianomime.report.aside import Aside, CountedSteps
 from pianomime.report.mp3 import write_mp3
 from pianomime.report.page import REPLAY_TYPE, page, source
 from pianomime.report.picture import draw
@@ -72,7 +74,7 @@ def write_report(
         performance: the performance to report on.
         folder: an existing folder for the files.
         video: whether to render a film, if this machine can.
-        progress: called in the phases "saving", "sound", "pictures", "rendering" and "page".
+        progress: called in the phases "saving", "pictures", "sound", "rendering" and "page".
         note: called with one line that says what could not be made and why.
         keep_parts: leave sounds and replay beside the page also where it holds them.
         earlier: folder of a report that this one will replace. Its film becomes part of this one if
@@ -83,17 +85,20 @@ def write_report(
     """
     progress("saving", 0, 0)
     poses = Poses(performance)
-    row = summarize(performance, poses.of(motion(performance)))
-    write_replay(folder / _REPLAY, performance, row, poses)
     played = performance.played()
-    performance.save(folder / _PERFORMANCE)
-    played.to_midi(folder / "performance.mid")
-    with telling(progress):
-        _write_sounds(played, performance.score, folder)
+    with (
+        telling(progress),
+        Aside(partial(_write_sounds, played, performance.score, folder)) as sounds,
+    ):
+        row = summarize(performance, poses.of(motion(performance)))
+        write_replay(folder / _REPLAY, performance, row, poses)
+        performance.save(folder / _PERFORMANCE)
+        played.to_midi(folder / "performance.mid")
         steps = Steps("pictures", len(_PICTURES))
         for name, theme in _PICTURES.items():
             draw(performance, folder / name, theme)
             steps.advance(1)
+        sounds.wait("sound")
     if video:
         try:
             _write_film(performance, poses, folder, progress)
@@ -108,8 +113,7 @@ def write_report(
     except PageMissing as error:
         script = None
         note(str(error))
-    sounds = [folder / name for name in _SOUNDS]
-    played_mp3, wanted_mp3 = (source("audio/mpeg", sound) for sound in sounds)
+    played_mp3, wanted_mp3 = (source("audio/mpeg", folder / name) for name in _SOUNDS)
     replay = source(REPLAY_TYPE, folder / _REPLAY)
     light, dark = (source("image/png", folder / name) for name in _PICTURES)
     html = page(
@@ -152,12 +156,11 @@ def _seal(performance: Path) -> str | None:
         return None
 
 
-def _write_sounds(played: Score, wanted: Score, folder: Path) -> None:
+def _write_sounds(played: Score, wanted: Score, folder: Path, steps: CountedSteps) -> None:
     """Write `performance.wav`, and `_SOUNDS`, a minute at a time."""
     made, asked = Sound(played), Sound(wanted)
     # Each is made twice, see `Sound`, and encoded once.
-    blocks = made.block_count + asked.block_count
-    steps = Steps("sound", (2 + _ENCODING) * blocks)
+    steps.total = (2 + _ENCODING) * (made.block_count + asked.block_count)
 
     def encoded(blocks: Iterable[NDArray[np.float32]]) -> Iterator[NDArray[np.float32]]:
         for block in blocks:
