@@ -20,11 +20,6 @@ export function make<K extends keyof HTMLElementTagNameMap>(
   return element;
 }
 
-/** Whether the user wants nothing to move that was not asked to. */
-export function wantsCalm(): boolean {
-  return matchMedia("(prefers-reduced-motion: reduce)").matches;
-}
-
 /** Outlines of the controls' signs, in a square of 24. */
 const SIGNS = {
   play: "M7 4.5v15l12-7.5z",

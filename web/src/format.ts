@@ -11,6 +11,7 @@ export interface Head {
   effort: number;
   world: string;
   touch: string;
+  works_pedal: boolean;
   seconds: number;
   rate: number;
   positions: number;

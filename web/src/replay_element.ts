@@ -10,7 +10,6 @@ import { Fallback } from "./fallback";
 import { film } from "./film";
 import type { Head, Quad, Triple } from "./format";
 import { helpDialog } from "./help";
-import { KeyPointer } from "./key_pointer";
 import { Kinematics } from "./kinematics";
 import style from "./look.css?inline";
 import type { Look } from "./look";
@@ -70,7 +69,6 @@ export class ReplayElement extends HTMLElement implements Showing {
   private readonly roll: Roll;
   private readonly viewBox = make("div", { class: "view" });
   private readonly help = helpDialog();
-  private readonly pointer = new KeyPointer();
   private drawing: Drawing | null = null;
   private view: View3D | null = null;
   private fallback: Fallback | null = null;
@@ -127,7 +125,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     const sheet = new CSSStyleSheet();
     sheet.replaceSync(style);
     root.adoptedStyleSheets = [sheet];
-    this.viewBox.append(this.overlay.root, this.pointer.tip);
+    this.viewBox.append(this.overlay.root);
     root.append(this.viewBox, this.bar.root, this.roll.root, this.help);
   }
 
@@ -392,14 +390,13 @@ export class ReplayElement extends HTMLElement implements Showing {
     if (this.drawing) {
       this.viewBox.prepend(canvas);
       steerByPointer(canvas, () => this.view?.rig ?? null);
-      this.pointer.listen(canvas);
       canvas.addEventListener("webglcontextrestored", () => {
         this.isStale = true;
       });
     } else {
       this.fallback = new Fallback(
-        this.inside("picture", "img"),
-        this.inside("film", "video"),
+        this.getAttribute("fallback") ?? this.inside("picture", "img"),
+        this.getAttribute("film") ?? this.inside("film", "video"),
       );
       this.viewBox.prepend(this.fallback.root);
     }
@@ -410,15 +407,14 @@ export class ReplayElement extends HTMLElement implements Showing {
     this.loading = null;
     const { src } = this;
     const from = this.getAttribute("data-from");
+    if (src === null && from === null) return;
+    const loading = new AbortController();
+    this.loading = loading;
     this.view?.dispose();
     this.view = null;
     this.probe = null;
     this.data = new ReplayData();
     this.overlay.setMessage(null);
-    this.drawing?.renderer.clear();
-    if (src === null && from === null) return;
-    const loading = new AbortController();
-    this.loading = loading;
     this.ready = new Promise((resolve, reject) => {
       this.settle = { resolve, reject };
     });
@@ -505,6 +501,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     const { state } = this;
     if (state !== this.lastState) {
       this.lastState = state;
+      if (state === "growing" || state === "done") this.start();
       this.dispatchEvent(new Event("statechange"));
     }
     if (!this.isVisible && !this.settle) return;
@@ -523,7 +520,6 @@ export class ReplayElement extends HTMLElement implements Showing {
       const moved = view.moveCamera(passed / 1000);
       draws = resized || moved || changed;
       this.overlay.setView(view.rig.view);
-      this.pointer.update(view, data, time, changed || moved);
     }
     this.isStale = false;
     this.fallback?.update(time, this.clock.playing && !this.clock.waiting, this.clock.rate);
@@ -547,6 +543,13 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.settle = null;
     }
   };
+
+  /** Begin to play, where that is wanted and nobody has done so. */
+  private start(): void {
+    if (this.isUntouched && this.hasAttribute("autoplay") && !this.calm.matches) {
+      this.clock.play();
+    }
+  }
 
   private updateControls(time: number): void {
     const { clock, data } = this;
@@ -727,11 +730,6 @@ function paintBackdrop(draw: CanvasRenderingContext2D, look: Look): void {
 
 function failureText(reason: unknown): string {
   // A browser says nothing more about a connection than this type of error.
-  if (reason instanceof TypeError) {
-    return location.protocol === "file:"
-      ? "The replay lies beside this page, and browsers read no second file from a disk. " +
-          "Run `python -m http.server` in this folder and open the address that it prints."
-      : "The connection was lost while the replay was read.";
-  }
+  if (reason instanceof TypeError) return "The connection was lost while the replay was read.";
   return reason instanceof Error ? reason.message : String(reason);
 }

@@ -6,7 +6,6 @@ import {
   PCFShadowMap,
   PerspectiveCamera,
   Scene,
-  Vector3,
   WebGLRenderer,
 } from "three";
 import type { ShaderMaterial } from "three";
@@ -19,8 +18,7 @@ import type { Notes, SceneContent } from "./format";
 import { KEYS } from "./format";
 import { Kinematics } from "./kinematics";
 import type { Look, Paint } from "./look";
-import { handPaint, heardPaint } from "./look";
-import { MARKED, missedAt } from "./missed";
+import { handPaint, heardPaint, isMissed } from "./look";
 import { PianoScene } from "./piano_scene";
 import { lightPlain, plainMaterial } from "./plain_material";
 import type { ReplayData } from "./replay_data";
@@ -37,6 +35,8 @@ const SOFTWARE = 2;
 /** [ms] Frames that take longer than this, for so long in all, are reason to draw less. */
 const SLOW = 45;
 const PATIENCE = 900;
+/** [s] How long at least a missed note is marked at its key. */
+const MARKED = 0.5;
 /** [m] A finger's number hovers so far above its tip. */
 const ABOVE_TIP = 0.014;
 
@@ -187,31 +187,6 @@ export class View3D {
     return true;
   }
 
-  /**
-   * The key at a place of the canvas, or null; whatever is before it.
-   *
-   * @param x from the left [px].
-   * @param y from the top [px].
-   */
-  keyAt(x: number, y: number): number | null {
-    const place = new Vector3((2 * x) / this.width - 1, 1 - (2 * y) / this.height, 0.5);
-    const from = this.camera.position;
-    const along = place.unproject(this.camera).sub(from);
-    let found: number | null = null;
-    let nearest = Infinity;
-    // Keys lie flat, so that their tops are what the eye sees of them.
-    this.content.keys.forEach(({ top, half }, key) => {
-      const far = (top[2] - from.z) / along.z;
-      const inside =
-        Math.abs(from.x + far * along.x - top[0]) < half[0] &&
-        Math.abs(from.y + far * along.y - top[1]) < half[1];
-      if (!inside || far <= 0 || far >= nearest) return;
-      found = key;
-      nearest = far;
-    });
-    return found;
-  }
-
   /** Take up a size of the page's canvas [px]; says whether that changes anything. */
   resize(width: number, height: number): boolean {
     if (width === this.width && height === this.height) return false;
@@ -305,7 +280,8 @@ export class View3D {
     }
     const { notes } = data;
     data.noteSpans.visit(time - MARKED, time, (place) => {
-      if (!missedAt(notes, place, time)) return;
+      if (!isMissed(notes, place)) return;
+      if (Math.max(notes.offset[place]!, notes.onset[place]! + MARKED) < time) return;
       const { top, half } = keys[notes.key[place]!]!;
       const wrong: Paint = 3;
       badges.add(top[0] + 0.6 * half[0], top[1], top[2] + 0.006, CROSS, wrong);

@@ -1,6 +1,6 @@
 /** The app: a library beside the performance that is watched, or beside two that are compared. */
 
-import { make, wantsCalm } from "../dom";
+import { make } from "../dom";
 import { clockTime } from "../wording";
 import * as api from "./api";
 import { better, side } from "./measures";
@@ -114,14 +114,7 @@ export class App {
       });
     }
     addEventListener("drop", (event) => {
-      const items = [...(event.dataTransfer?.items ?? [])].filter(({ kind }) => kind === "file");
-      // A folder is a file as well, until one asks for its bytes.
-      const folders = items.map((item) => item.webkitGetAsEntry()?.isDirectory ?? false);
-      const files = items.map((item) => item.getAsFile());
-      void this.take(
-        files.filter((file, i): file is File => file !== null && !folders[i]),
-        files.flatMap((file, i) => (file !== null && folders[i] ? [file.name] : [])),
-      );
+      void this.take([...(event.dataTransfer?.files ?? [])]);
     });
     this.takeChange();
     void this.load();
@@ -143,14 +136,14 @@ export class App {
   private button(text: string, act: () => unknown): HTMLButtonElement {
     const button = make("button", { type: "button" }, text);
     button.addEventListener("click", () => {
-      this.tell(null);
       void this.attempt(act);
     });
     return button;
   }
 
-  /** Do something, and tell the user if it fails, until the user does something else. */
+  /** Do something, and tell the user if it fails. */
   private async attempt(act: () => unknown): Promise<void> {
+    this.tell(null);
     try {
       await act();
     } catch (error) {
@@ -227,16 +220,11 @@ export class App {
     );
   }
 
-  /**
-   * Take files that were dropped, and play the first that can be.
-   *
-   * @param folders names of folders that were dropped with them.
-   */
-  private async take(files: File[], folders: string[] = []): Promise<void> {
-    this.tell(null);
+  /** Take files that were dropped, and play the first that can be. */
+  private async take(files: File[]): Promise<void> {
     await this.attempt(async () => {
-      const taken: api.Song[] = [];
-      const lines = folders.map((name) => `${name} is a folder: drop the MIDI files that it holds.`);
+      let first: api.Song | null = null;
+      const failed: string[] = [];
       for (const file of files) {
         const limit = this.library?.limit ?? Infinity;
         try {
@@ -246,20 +234,16 @@ export class App {
                 "For a recording, make MIDI of it first.",
             );
           }
-          taken.push(await api.upload(file));
+          first ??= await api.upload(file);
         } catch (error) {
           if (!(error instanceof api.Refused)) throw error;
-          lines.push(error.message);
+          failed.push(error.message);
         }
       }
-      const [first] = taken;
-      if (taken.length > 1) {
-        lines.push(`${taken.length} songs are in the library now; ${first!.title} is played.`);
-      }
-      lines.push(...taken.flatMap(({ remarks }) => remarks));
-      if (lines.length > 0) this.tell(lines.join(" "));
       if (first) await this.show({ song: first.id, ...this.settings });
       await this.load();
+      const remarks = first?.remarks ?? [];
+      if (failed.length + remarks.length > 0) this.tell([...failed, ...remarks].join(" "));
     });
   }
 
@@ -274,7 +258,7 @@ export class App {
     const [first] = this.seats;
     seat.replay.follow(first.replay);
     first.replay.currentTime = 0;
-    if (!wantsCalm()) first.replay.play();
+    first.replay.play();
   }
 
   private async again(): Promise<void> {

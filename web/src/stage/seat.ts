@@ -1,6 +1,6 @@
 /** A place in which one performance is shown. */
 
-import { make, wantsCalm } from "../dom";
+import { make } from "../dom";
 import type { ReplayElement } from "../replay_element";
 import * as api from "./api";
 
@@ -50,7 +50,7 @@ export class Seat {
     this.replay.wanted = null;
     this.replay.src = `jobs/${job}/replay`;
     // It waits for what is to come. Asked for by a click, so that the browser lets it sound.
-    if (!wantsCalm()) this.replay.play();
+    if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.replay.play();
     this.changed();
   }
 
