@@ -89,11 +89,18 @@ export class Overlay {
   /**
    * Show what there is to wait for.
    *
+   * @param loading whether a replay was asked for.
    * @param untouched whether nobody has played anything yet.
    */
   update(
     data: ReplayData,
-    state: { playing: boolean; waiting: boolean; untouched: boolean; pictured: boolean },
+    state: {
+      loading: boolean;
+      playing: boolean;
+      waiting: boolean;
+      untouched: boolean;
+      pictured: boolean;
+    },
   ): void {
     const { head, plan, motion } = data;
     if (head) setText(this.caption, `${head.title} — ${head.player}, effort ${head.effort}`);
@@ -104,7 +111,10 @@ export class Overlay {
     show(this.planning, !begun && plan !== null && !data.ended);
     show(
       this.spinner,
-      !data.ended && ((!begun && plan === null) || (begun && state.waiting)) && !this.hasMessage,
+      state.loading &&
+        !data.ended &&
+        ((!begun && plan === null) || (begun && state.waiting)) &&
+        !this.hasMessage,
     );
     if (plan && !begun) {
       setText(this.phase, plan.phase);

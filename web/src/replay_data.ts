@@ -20,6 +20,13 @@ const NO_NOTES: Notes = {
   cause: [],
 };
 
+let revisions = 0;
+
+/** No two replays share a number either: who has drawn one sees that the next is another. */
+function nextRevision(): number {
+  return ++revisions;
+}
+
 export class ReplayData {
   head: Head | null = null;
   scene: SceneContent | null = null;
@@ -41,8 +48,8 @@ export class ReplayData {
   plan: Plan | null = null;
   metrics: [string, string][] | null = null;
   failure: string | null = null;
-  /** Grows with every change to the notes, what was heard, or the pedal. */
-  revision = 0;
+  /** Another number with every change to the notes, what was heard, or the pedal. */
+  revision = nextRevision();
 
   /** Whether all has arrived that will. */
   get ended(): boolean {
@@ -66,14 +73,14 @@ export class ReplayData {
       case "NOTE":
         this.notes = json(block) as Notes;
         this.noteSpans = new Spans(this.notes.onset, this.notes.offset);
-        this.revision++;
+        this.revision = nextRevision();
         break;
       case "HEAR":
         this.takeHeard(json(block) as Heard & { from: number });
         break;
       case "PEDL":
         this.pedal = (json(block) as { down: [number, number][] }).down;
-        this.revision++;
+        this.revision = nextRevision();
         break;
       case "MOVE":
         if (!this.motion) throw new Error("The replay has poses before its head.");
@@ -115,7 +122,7 @@ export class ReplayData {
       cause: join(heard.cause, more.cause),
     };
     this.heardSpans = new Spans(this.heard.on, this.heard.off);
-    this.revision++;
+    this.revision = nextRevision();
   }
 }
 

@@ -402,19 +402,29 @@ export class ReplayElement extends HTMLElement implements Showing {
     }
   }
 
-  private load(): void {
+  /** Show nothing of what was there. */
+  private empty(): void {
     this.loading?.abort();
     this.loading = null;
+    this.view?.dispose();
+    this.view = null;
+    // A canvas keeps its last picture until something else is drawn.
+    this.drawing?.renderer.clear();
+    this.probe = null;
+    this.data = new ReplayData();
+    this.overlay.setMessage(null);
+    this.roll.tell(null);
+    this.ready = Promise.resolve();
+    this.settle = null;
+  }
+
+  private load(): void {
+    this.empty();
     const { src } = this;
     const from = this.getAttribute("data-from");
     if (src === null && from === null) return;
     const loading = new AbortController();
     this.loading = loading;
-    this.view?.dispose();
-    this.view = null;
-    this.probe = null;
-    this.data = new ReplayData();
-    this.overlay.setMessage(null);
     this.ready = new Promise((resolve, reject) => {
       this.settle = { resolve, reject };
     });
@@ -558,7 +568,13 @@ export class ReplayElement extends HTMLElement implements Showing {
     if (clock.blocked) this.isUntouched = true;
     const pictured = this.view?.isPrepared ?? false;
     const { playing, waiting, duration, rate } = clock;
-    this.overlay.update(data, { playing, waiting, untouched: this.isUntouched, pictured });
+    this.overlay.update(data, {
+      loading: this.loading !== null,
+      playing,
+      waiting,
+      untouched: this.isUntouched,
+      pictured,
+    });
     this.bar.update({
       time,
       duration,

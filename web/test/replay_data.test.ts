@@ -44,6 +44,14 @@ describe("ReplayData", () => {
     expect(found).toEqual([2, 4]);
   });
 
+  it("has another revision with each change, and than any other replay", () => {
+    const [one, other] = [taken(head(), heard(0, [1])), taken(head(), heard(0, [2]))];
+    const seen = [one.revision, other.revision, new ReplayData().revision];
+    for (const block of new BlockParser().push(joined(heard(1, [3])))) one.take(block);
+    seen.push(one.revision);
+    expect(new Set(seen).size).toBe(seen.length);
+  });
+
   it("skips tags that it does not know", () => {
     expect(taken(head(), block("NEWS", new Uint8Array(3))).head?.title).toBe("<b>A song</b>");
   });
