@@ -50,8 +50,8 @@ def song(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-def open_page(chromium: Any, stage: Stage, **more: Any) -> Any:
-    page = chromium.new_page(viewport={"width": 1000, "height": 800}, **more)
+def open_page(chromium: Any, stage: Stage, **options: str) -> Any:
+    page = chromium.new_page(viewport={"width": 1000, "height": 800}, **options)
     page.wrong = []
     page.on("pageerror", lambda error: page.wrong.append(str(error)))
     page.on("console", lambda said: page.wrong.append(said.text) if said.type == "error" else None)
@@ -60,18 +60,30 @@ def open_page(chromium: Any, stage: Stage, **more: Any) -> Any:
     return page
 
 
-def drop(page: Any, name: str, content: bytes, folder: bool = False) -> None:
+def drop(page: Any, name: str, content: bytes) -> None:
+    drop_all(page, {name: content})
+
+
+def drop_all(page: Any, files: dict[str, bytes]) -> None:
     page.evaluate(
-        """([name, bytes, folder]) => {
+        """(files) => {
           const data = new DataTransfer();
-          data.items.add(new File([new Uint8Array(bytes)], name));
-          // No script can make a folder that is dropped.
-          DataTransferItem.prototype.webkitGetAsEntry = () => ({ isDirectory: folder });
+          for (const [name, bytes] of files) {
+            data.items.add(new File([new Uint8Array(bytes)], name));
+          }
           const more = { dataTransfer: data, bubbles: true, cancelable: true };
           document.body.dispatchEvent(new DragEvent("drop", more));
         }""",
-        [name, list(content), folder],
+        [[name, list(content)] for name, content in files.items()],
     )
+
+
+def drop_from_disk(page: Any, *paths: Path) -> None:
+    """As a file manager does it."""
+    chrome = page.context.new_cdp_session(page)
+    data = {"items": [], "files": [str(path) for path in paths], "dragOperationsMask": 1}
+    for kind in ("dragEnter", "dragOver", "drop"):
+        chrome.send("Input.dispatchDragEvent", {"type": kind, "x": 400, "y": 400, "data": data})
 
 
 def wait(page: Any, what: str) -> None:
@@ -91,7 +103,7 @@ def test_what_is_dropped_is_played_while_it_is_made(
     wait(page, f"{FIRST}.state === 'done'")
     heard = page.evaluate(f"{FIRST}.metrics.length")
     assert heard > 5
-    assert page.get_by_role("link", name="MIDI").is_visible()
+    page.get_by_role("link", name="MIDI").wait_for()
     # Its name is text, and it is in the library.
     assert "hacked" not in page.title()
     assert page.locator("img[src=x]").count() == 0
@@ -103,21 +115,27 @@ def test_what_is_dropped_is_played_while_it_is_made(
 
 
 def test_two_are_compared_on_one_clock(chromium: Any, stage: Stage, song: bytes) -> None:
-    page = open_page(chromium, stage)
+    page = open_page(chromium, stage, reduced_motion="reduce")
     drop(page, "one.mid", song)
     wait(page, f"{FIRST}.state === 'done'")
     page.get_by_role("button", name="Compare").click()
     page.get_by_label("World").select_option("solid")
     page.get_by_role("button", name="Try again").click()
     wait(page, f"{SECOND}.state === 'done'")
-    assert page.locator(".show > table td").count() == 2 * page.locator(".show > table tr").count()
+    # Nothing moves by itself where that is not wanted.
+    assert page.evaluate(f"[{FIRST}.playing, {FIRST}.currentTime]") == [False, 0]
     page.evaluate(f"{FIRST}.currentTime = 1.25")
     assert page.evaluate(f"{SECOND}.currentTime") == 1.25
-    # What is taken away does not come back.
-    compare = page.get_by_role("button", name="Compare")
-    compare.click()
-    compare.click()
-    assert page.evaluate(f"[{SECOND}.state, {SECOND}.head]") == ["empty", None]
+    rows, cells = (
+        f"document.querySelectorAll('.show > table {tag}').length" for tag in ("tr", "td")
+    )
+    wait(page, f"{rows} > 0 && {cells} === 2 * {rows}")
+    # What is compared next begins with nothing.
+    page.get_by_role("button", name="Compare").click()
+    page.get_by_role("button", name="Compare").click()
+    wait(page, f"{SECOND}.state === 'empty'")
+    assert page.evaluate(f"[{SECOND}.duration, {SECOND}.metrics, {SECOND}.head]") == [0, None, None]
+    assert page.locator(".seat:nth-child(3) .downloads").is_hidden()
     assert page.evaluate(f"{FIRST}.state") == "done"
     assert not page.wrong
 
@@ -141,37 +159,35 @@ def test_bad_files_are_one_line_on_the_page(chromium: Any, stage: Stage, song: b
     assert all("status of 400" in wrong for wrong in page.wrong)
 
 
-def test_a_folder_is_told_and_several_files_are_all_taken(
-    chromium: Any, stage: Stage, song: bytes, tmp_path: Path
-) -> None:
+def test_a_message_stays_until_it_is_dismissed(chromium: Any, stage: Stage, song: bytes) -> None:
     page = open_page(chromium, stage)
-    message = page.locator(".stage > .message:visible")
-    drop(page, "my songs", b"", folder=True)
-    message.filter(has_text="my songs is a folder").wait_for()
-    names = ["one.mid", "two.mid", "no.mid"]
-    for name in names:
-        (tmp_path / name).write_bytes(song if name != "no.mid" else b"no music")
-    page.set_input_files("input[type=file]", [tmp_path / name for name in names])
-    message.filter(has_text="2 songs are in the library now").filter(has_text="no.mid").wait_for()
-    wait(page, f"{FIRST}.state === 'done'")
-    # What was said stays until something else is done.
-    assert message.filter(has_text="2 songs").count() == 1
-    for name in ("one", "two"):
-        assert page.locator("nav ul").first.get_by_text(name, exact=True).count() == 1
-    page.get_by_role("button", name="Try again").click()
+    drop(page, "good.mid", song)
+    drop(page, "no.mid", b"not music at all")
+    message = page.locator(".stage > .message:visible").filter(has_text="no.mid")
+    message.wait_for()
+    # The library is read again when the song is done.
+    wait(page, "document.querySelectorAll('nav ul')[1].children.length === 1")
+    assert message.is_visible()
+    message.get_by_role("button", name="Dismiss").click()
     assert message.count() == 0
 
 
-def test_nothing_moves_by_itself_where_that_is_not_wanted(
-    chromium: Any, stage: Stage, song: bytes
+def test_all_that_is_dropped_is_taken_or_told(
+    chromium: Any, stage: Stage, song: bytes, tmp_path: Path
 ) -> None:
-    page = open_page(chromium, stage, reduced_motion="reduce")
-    drop(page, "song.mid", song)
-    wait(page, f"{FIRST}.state === 'done'")
-    page.get_by_role("button", name="Compare").click()
-    page.get_by_role("button", name="Try again").click()
-    wait(page, f"{SECOND}.state === 'done'")
-    assert page.evaluate(f"[{FIRST}.playing, {SECOND}.playing]") == [False, False]
+    page = open_page(chromium, stage)
+    songs = page.locator("nav ul").nth(0).locator("li")
+    before = songs.count()
+    drop_all(page, {"one.mid": song, "no.mid": b"no", "two.mid": song})
+    message = page.locator(".stage > .message:visible")
+    message.filter(has_text="Taken: one, two. one is played.").filter(has_text="no.mid").wait_for()
+    wait(page, f"{FIRST}.head?.title === 'one'")
+    assert songs.count() == before + 2
+    folder = tmp_path / "album"
+    folder.mkdir()
+    drop_from_disk(page, folder)
+    message.filter(has_text="album is a folder").wait_for()
+    assert page.get_by_text("The stage does not answer").is_hidden()
 
 
 def test_playing_begins_long_before_it_is_all_made(chromium: Any, stage: Stage) -> None:

@@ -5,7 +5,6 @@ export interface Song {
   title: string;
   seconds: number;
   notes: number;
-  remarks: string[];
 }
 
 /** Label and value, as text. */
@@ -73,9 +72,13 @@ export function library(): Promise<Library> {
 }
 
 /** Give a file to the server, which says what song it is. */
-export function upload(file: File): Promise<Song> {
+export async function upload(file: File): Promise<Song> {
+  // Sent as it is, one that cannot be read would look like a server that is gone.
+  const body = await file.arrayBuffer().catch(() => {
+    throw new Refused(`${file.name} cannot be read.`);
+  });
   const headers = { "X-File-Name": encodeURIComponent(file.name) };
-  return json("songs", { method: "POST", headers, body: file });
+  return json("songs", { method: "POST", headers, body });
 }
 
 /**

@@ -3,9 +3,13 @@
 import { make } from "../dom";
 import { clockTime } from "../wording";
 import * as api from "./api";
+import type { Dropped } from "./dropped";
+import { droppedWith } from "./dropped";
 import { better, side } from "./measures";
+import { Notice } from "./notice";
 import { Seat } from "./seat";
 import style from "./stage.css?inline";
+import { uploadAll, uploadsText } from "./uploads";
 
 const EFFORTS = ["0: at once", "1: better", "2: slow", "3: best, slowest"];
 const LENGTHS: readonly (readonly [string, number | null])[] = [
@@ -25,6 +29,7 @@ export class App {
   private last: Asked | null = null;
   private readonly seats: [Seat, Seat];
   private comparing = false;
+  private readonly calm = matchMedia("(prefers-reduced-motion: reduce)");
   private waiting = 0;
 
   private readonly player = make("select", { "aria-label": "Player" });
@@ -41,7 +46,7 @@ export class App {
   private readonly performances = make("ul");
   private readonly unreadable = make("details", { hidden: "" });
   private readonly notHere = make("details", { hidden: "" });
-  private readonly message = make("p", { class: "message", role: "alert", hidden: "" });
+  private readonly notice = new Notice();
   private readonly lost = make("p", { class: "message", role: "alert", hidden: "" }, LOST);
   private readonly chooser = make("input", { type: "file", hidden: "", multiple: "" });
   private readonly measures = make("table", { hidden: "" });
@@ -65,7 +70,7 @@ export class App {
     this.empty.append(make("p", {}, "Drop a MIDI file here, and two hands play it."), make("p", {}, "Or choose a song on the left."));
     this.chooser.accept = ".mid,.midi,.kar,.rmi,.rmid,.smf";
     this.chooser.addEventListener("change", () => {
-      void this.take([...(this.chooser.files ?? [])]);
+      void this.take({ files: [...(this.chooser.files ?? [])], folders: [] });
       this.chooser.value = "";
     });
     this.find.addEventListener("input", () => {
@@ -76,7 +81,7 @@ export class App {
     this.root.append(
       make("header", {}, make("h1", {}, "The stage"), drop, this.chooser),
       this.lost,
-      this.message,
+      this.notice.root,
       make(
         "div",
         { class: "settings", role: "group", "aria-label": "How it is played" },
@@ -114,7 +119,7 @@ export class App {
       });
     }
     addEventListener("drop", (event) => {
-      void this.take([...(event.dataTransfer?.files ?? [])]);
+      if (event.dataTransfer) void this.take(droppedWith(event.dataTransfer));
     });
     this.takeChange();
     void this.load();
@@ -136,25 +141,25 @@ export class App {
   private button(text: string, act: () => unknown): HTMLButtonElement {
     const button = make("button", { type: "button" }, text);
     button.addEventListener("click", () => {
-      void this.attempt(act);
+      void this.answer(act);
     });
     return button;
   }
 
+  /** Do what the user asks for, who has read by now what was told before. */
+  private async answer(act: () => unknown): Promise<void> {
+    this.notice.tell(null);
+    await this.attempt(act);
+  }
+
   /** Do something, and tell the user if it fails. */
   private async attempt(act: () => unknown): Promise<void> {
-    this.tell(null);
     try {
       await act();
     } catch (error) {
       if (error instanceof api.Lost) this.lose();
-      else this.tell(error instanceof Error ? error.message : String(error));
+      else this.notice.tell(error instanceof Error ? error.message : String(error));
     }
-  }
-
-  private tell(line: string | null): void {
-    this.message.textContent = line ?? "";
-    this.message.hidden = line === null;
   }
 
   /** The server is gone: ask again, until it is there or the page is closed. */
@@ -220,30 +225,16 @@ export class App {
     );
   }
 
-  /** Take files that were dropped, and play the first that can be. */
-  private async take(files: File[]): Promise<void> {
-    await this.attempt(async () => {
-      let first: api.Song | null = null;
-      const failed: string[] = [];
-      for (const file of files) {
-        const limit = this.library?.limit ?? Infinity;
-        try {
-          if (file.size > limit) {
-            throw new api.Refused(
-              `${file.name} is larger than ${Math.round(limit / 1e6)} MB: no MIDI file is. ` +
-                "For a recording, make MIDI of it first.",
-            );
-          }
-          first ??= await api.upload(file);
-        } catch (error) {
-          if (!(error instanceof api.Refused)) throw error;
-          failed.push(error.message);
-        }
-      }
+  /** Take what was dropped, and play the first that can be. */
+  private async take(dropped: Dropped): Promise<void> {
+    await this.answer(async () => {
+      const uploads = await uploadAll(dropped, this.library?.limit ?? Infinity);
+      const line = uploadsText(uploads);
+      // Of another drop, something may have been told in the meantime.
+      if (line !== null) this.notice.tell(line);
+      const [first] = uploads.songs;
       if (first) await this.show({ song: first.id, ...this.settings });
       await this.load();
-      const remarks = first?.remarks ?? [];
-      if (failed.length + remarks.length > 0) this.tell([...failed, ...remarks].join(" "));
     });
   }
 
@@ -253,12 +244,12 @@ export class App {
     const seat = this.active;
     seat.root.hidden = false;
     await seat.show(asked);
-    if (!this.comparing) return;
-    // Both from the beginning; the clock waits for the slower one.
-    const [first] = this.seats;
-    seat.replay.follow(first.replay);
-    first.replay.currentTime = 0;
-    first.replay.play();
+    // Two that are compared begin together; the clock waits for the slower one.
+    const leader = this.seats[0].replay;
+    if (this.comparing) seat.replay.follow(leader);
+    leader.currentTime = 0;
+    // Asked for by a click, so that the browser lets it sound.
+    if (!this.calm.matches) leader.play();
   }
 
   private async again(): Promise<void> {
@@ -271,12 +262,8 @@ export class App {
     this.comparing = on;
     this.compareButton.setAttribute("aria-pressed", String(on));
     const second = this.seats[1];
-    second.tell(on ? "Choose a song or a performance, or try again with other settings." : null);
-    if (!on) {
-      second.replay.follow(null);
-      second.replay.src = null;
-      void this.attempt(() => second.stop());
-    }
+    if (on) second.notice.tell("Choose a song or a performance, or try again with other settings.");
+    else void this.attempt(() => second.clear());
     second.root.hidden = !on;
     this.takeChange();
   }

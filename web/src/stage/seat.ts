@@ -3,6 +3,7 @@
 import { make } from "../dom";
 import type { ReplayElement } from "../replay_element";
 import * as api from "./api";
+import { Notice } from "./notice";
 
 const DOWNLOADS = [
   ["MIDI", "performance.mid"],
@@ -14,7 +15,8 @@ const DOWNLOADS = [
 export class Seat {
   readonly root = make("div", { class: "seat" });
   readonly replay: ReplayElement;
-  private readonly message = make("p", { class: "message", role: "alert", hidden: "" });
+  readonly notice = new Notice();
+  private readonly remarks = make("p", { class: "remarks", hidden: "" });
   private readonly downloads = make("p", { class: "downloads", hidden: "" });
   private job: string | null = null;
 
@@ -30,7 +32,7 @@ export class Seat {
     this.replay.addEventListener("statechange", () => {
       this.takeState();
     });
-    this.root.append(this.message, this.replay, this.downloads);
+    this.root.append(this.notice.root, this.replay, this.remarks, this.downloads);
   }
 
   /** Whether something is being played for it. */
@@ -40,7 +42,7 @@ export class Seat {
 
   /** Play a song, or show a saved performance, in place of what was there. */
   async show(asked: Parameters<typeof api.start>[1]): Promise<void> {
-    this.tell(null);
+    this.notice.tell(null);
     this.downloads.hidden = true;
     const job = await api.start(this.number, asked);
     this.job = job;
@@ -49,8 +51,6 @@ export class Seat {
     this.replay.sound = "song" in asked ? `jobs/${job}/sound` : null;
     this.replay.wanted = null;
     this.replay.src = `jobs/${job}/replay`;
-    // It waits for what is to come. Asked for by a click, so that the browser lets it sound.
-    if (!matchMedia("(prefers-reduced-motion: reduce)").matches) this.replay.play();
     this.changed();
   }
 
@@ -58,14 +58,24 @@ export class Seat {
     if (this.job !== null && this.busy) await api.stop(this.job);
   }
 
-  /** One line for the user, or none. */
-  tell(line: string | null): void {
-    this.message.textContent = line ?? "";
-    this.message.hidden = line === null;
+  /** Show nothing, and end what is being played for it. */
+  async clear(): Promise<void> {
+    // Whether there is anything to stop, the replay says as long as it is there.
+    const stopped = this.stop();
+    const { replay } = this;
+    this.job = null;
+    this.notice.tell(null);
+    this.downloads.hidden = true;
+    replay.follow(null);
+    replay.src = replay.sound = replay.wanted = null;
+    await stopped;
   }
 
   private takeState(): void {
     const { job, replay } = this;
+    const remarks = replay.head?.remarks ?? [];
+    this.remarks.textContent = `While the score was read: ${remarks.join("; ")}.`;
+    this.remarks.hidden = remarks.length === 0;
     if (job !== null && replay.state === "done") {
       // Only the finished sound can be entered anywhere.
       replay.sound = `jobs/${job}/sound?whole`;
