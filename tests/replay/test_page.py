@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -131,23 +132,15 @@ def test_the_keyboard_alone_plays_and_seeks(page: Any) -> None:
     assert page.evaluate(f"{REPLAY}.currentTime") == pytest.approx(stopped + 1 / 60, abs=0.02)
 
 
-def test_a_key_under_the_pointer_is_told_of(page: Any) -> None:
-    page.keyboard.press("3")  # seen from above
-    page.wait_for_timeout(1000)
-    box = page.locator("pianomime-replay canvas").first.bounding_box()
-    tip = page.locator("pianomime-replay .view .tip")
-    told = set()
-    for place in range(1, 24):
-        page.mouse.move(box["x"] + place / 24 * box["width"], box["y"] + 0.42 * box["height"])
-        page.wait_for_timeout(60)
-        if "seen" in (tip.get_attribute("class") or ""):
-            told.add((tip.text_content() or "").split()[0])
-    assert len(told) > 5
-    page.mouse.move(0, 0)
-    page.wait_for_function(
-        "!document.querySelector('pianomime-replay').shadowRoot"
-        ".querySelector('.view .tip').classList.contains('seen')"
-    )
+def test_a_long_report_opened_from_a_disk_says_what_to_do(
+    chromium: Any, performance: Performance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pianomime.report.page.MOST_EMBEDDED", 0)
+    write_report(performance, tmp_path, False, no_progress, pytest.fail)
+    page = chromium.new_page()
+    page.goto((tmp_path / "report.html").as_uri())
+    page.get_by_role("alert").filter(has_text="python -m http.server").wait_for()
+    page.close()
 
 
 def test_without_webgl_the_picture_is_shown_and_a_line_says_why(

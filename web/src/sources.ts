@@ -1,11 +1,18 @@
 /** Where the bytes of a replay come from. */
 
+const NOT_FROM_DISK =
+  "A page opened from a disk may not read the replay beside it. Serve its folder (`python -m " +
+  "http.server`, then open the address that it prints), or open the folder with `pianomime stage FOLDER`.";
+
 /** Bytes from an address, as they arrive. */
 export async function fromAddress(
   address: string,
   signal: AbortSignal,
 ): Promise<ReadableStream<Uint8Array<ArrayBuffer>>> {
-  const answer = await fetch(address, { signal });
+  const isOnDisk = new URL(address, document.baseURI).protocol === "file:";
+  const answer = await fetch(address, { signal }).catch((reason: unknown) => {
+    throw isOnDisk && !signal.aborted ? new Error(NOT_FROM_DISK) : reason;
+  });
   if (!answer.ok || !answer.body) throw new Error(`The replay is not there (${answer.status}).`);
   return answer.body;
 }
