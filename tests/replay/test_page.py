@@ -132,6 +132,37 @@ def test_the_keyboard_alone_plays_and_seeks(page: Any) -> None:
     assert page.evaluate(f"{REPLAY}.currentTime") == pytest.approx(stopped + 1 / 60, abs=0.02)
 
 
+def test_a_key_that_is_pointed_at_tells_why_its_note_was_missed(page: Any) -> None:
+    page.locator("pianomime-replay").focus()
+    page.keyboard.press("3")  # from above
+    in_roll, in_picture = page.locator(".roll .tip.seen"), page.locator(".view .tip.seen")
+    told = ""
+    while "missed: " not in told:
+        page.keyboard.press("x")
+        told = in_roll.text_content()
+    page.wait_for_timeout(1500)  # The camera is there.
+    box = page.locator(".view canvas").bounding_box()
+    across = box["y"] + 0.36 * box["height"]
+    steps = np.arange(0.03, 0.97, 0.005) * box["width"] + box["x"]
+
+    def seen() -> str | None:
+        page.evaluate("new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
+        return in_picture.text_content() if in_picture.count() else None
+
+    def find(x: float) -> bool:
+        page.mouse.move(x, across)
+        return seen() == told
+
+    place = next(x for x in steps if find(x))
+    # A click does not seek or turn the picture, and a drag hides what is told.
+    page.mouse.click(place, across)
+    assert seen() == told
+    page.mouse.down()
+    page.mouse.move(place + 20, across)
+    assert seen() is None
+    page.mouse.up()
+
+
 def test_a_long_report_opened_from_a_disk_says_what_to_do(
     chromium: Any, performance: Performance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -68,7 +68,6 @@ export interface SceneContent {
   fingertips: { hand: number; finger: number; body: number; pos: Triple }[];
   cameras: Record<string, View>;
   light: { pos: Triple; target: Triple };
-  background: Triple;
 }
 
 export interface Notes {

@@ -21,7 +21,8 @@ const SHORTCUTS: [string, string][] = [
 ];
 const POINTERS =
   "Drag the picture to turn it, with shift or the right button to move it; the wheel or two fingers " +
-  "come nearer. Drag the roll to look elsewhere, with shift to loop a stretch; click a note to be there.";
+  "come nearer. Drag the roll to look elsewhere, with shift to loop a stretch; click a note to be there. " +
+  "Point at a key or a note, or tap it, to read what became of it.";
 
 export function helpDialog(): HTMLDialogElement {
   const rows = SHORTCUTS.map(([keys, what]) =>

@@ -15,7 +15,7 @@ import {
   ShadowMaterial,
   Vector3,
 } from "three";
-import type { Material } from "three";
+import type { Material, Raycaster } from "three";
 
 import type { Geom, SceneContent } from "./format";
 import { KEYS } from "./format";
@@ -58,6 +58,7 @@ interface MovingBody {
  * drawing in software takes as long for each of 176 instances as for a whole mesh.
  */
 interface Keys {
+  mesh: Mesh;
   position: BufferAttribute;
   color: BufferAttribute;
   keys: Int32Array;
@@ -160,6 +161,13 @@ export class PianoScene {
     for (let key = 0; key < KEYS; key++) this.lit[key] = sounding[key]!;
   }
 
+  /** The key that a ray meets, or the lamp of which it meets; -1 for none. */
+  keyAt(raycaster: Raycaster): number {
+    const { mesh, keys, count } = this.keys;
+    const [first] = raycaster.intersectObject(mesh, false);
+    return first?.faceIndex == null ? -1 : keys[Math.floor((3 * first.faceIndex) / count)]!;
+  }
+
   private paint(part: number, paint: Color): void {
     const { color, count } = this.keys;
     for (let i = part * count; i < (part + 1) * count; i++) color.setXYZ(i, paint.r, paint.g, paint.b);
@@ -226,6 +234,7 @@ export class PianoScene {
     mesh.frustumCulled = false;
     this.group.add(mesh);
     return {
+      mesh,
       position,
       color,
       keys: Int32Array.from(geoms, (geom) => Math.max(geom.key, geom.lamp)),

@@ -10,6 +10,8 @@ import { Fallback } from "./fallback";
 import { film } from "./film";
 import type { Head, Quad, Triple } from "./format";
 import { helpDialog } from "./help";
+import type { Hit } from "./hits";
+import { KeyTip } from "./key_tip";
 import { Kinematics } from "./kinematics";
 import style from "./look.css?inline";
 import type { Look } from "./look";
@@ -37,10 +39,8 @@ const FILM_HEIGHT = 720;
 
 type State = "empty" | "loading" | "planning" | "growing" | "done" | "failed";
 
-interface Fault {
+interface Fault extends Hit {
   time: number;
-  kind: "wanted" | "heard";
-  place: number;
 }
 
 /** The elements of the page, in the order in which they came; the first has the page's keys. */
@@ -71,6 +71,7 @@ export class ReplayElement extends HTMLElement implements Showing {
   private readonly help = helpDialog();
   private drawing: Drawing | null = null;
   private view: View3D | null = null;
+  private keyTip: KeyTip | null = null;
   private fallback: Fallback | null = null;
   private probe: { kinematics: Kinematics; pose: Float64Array } | null = null;
 
@@ -376,6 +377,8 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.drawing.renderer.domElement.remove();
       this.drawing = null;
     }
+    this.keyTip?.root.remove();
+    this.keyTip = null;
     this.fallback?.root.remove();
     this.fallback = null;
   }
@@ -388,7 +391,9 @@ export class ReplayElement extends HTMLElement implements Showing {
     });
     this.drawing = drawingOn(canvas);
     if (this.drawing) {
+      this.keyTip = new KeyTip(canvas);
       this.viewBox.prepend(canvas);
+      this.viewBox.append(this.keyTip.root);
       steerByPointer(canvas, () => this.view?.rig ?? null);
       canvas.addEventListener("webglcontextrestored", () => {
         this.isStale = true;
@@ -414,6 +419,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     this.data = new ReplayData();
     this.overlay.setMessage(null);
     this.roll.tell(null);
+    this.keyTip?.hide();
     this.ready = Promise.resolve();
     this.settle = null;
   }
@@ -529,6 +535,7 @@ export class ReplayElement extends HTMLElement implements Showing {
       const resized = view.resize(this.width, this.height);
       const moved = view.moveCamera(passed / 1000);
       draws = resized || moved || changed;
+      this.keyTip?.update(view, data, time);
       this.overlay.setView(view.rig.view);
     }
     this.isStale = false;

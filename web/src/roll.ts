@@ -3,10 +3,14 @@
 import type { Clock } from "./clock";
 import { make } from "./dom";
 import { KEYS } from "./format";
+import type { Hit } from "./hits";
+import { hitAt, hitText, hitTime } from "./hits";
 import type { Look, Paint } from "./look";
 import { handPaint, heardPaint, isMissed, paints } from "./look";
+import { DRAG } from "./pointing";
 import type { ReplayData } from "./replay_data";
-import { clockTime, heardText, wantedText } from "./wording";
+import { Tip } from "./tip";
+import { clockTime } from "./wording";
 
 const PEDAL_HEIGHT = 9;
 const AXIS_HEIGHT = 18;
@@ -15,14 +19,11 @@ const USUAL_SPAN = 14;
 const SHORTEST = 1;
 /** Where the playhead stands while the roll moves under it. */
 const HEAD_AT = 0.3;
-/** [px] A pointer that moves farther drags; one that is nearer to a note than this means it. */
-const DRAG = 5;
+/** [px] A pointer that is nearer to a note than this means it. */
 const REACH = 4;
 const MARGIN_KEYS = 2;
 /** [ms] The note at a playhead that was brought there is told of for so long. */
 const TOLD = 4000;
-
-type Hit = { kind: "wanted" | "heard"; place: number } | null;
 
 export class Roll {
   readonly root: HTMLElement;
@@ -31,7 +32,7 @@ export class Roll {
     role: "img",
     "aria-label": "Piano roll. Click for a time, drag to move, hold shift and drag to loop.",
   });
-  private readonly tip = make("div", { class: "tip", role: "status" });
+  private readonly tip = new Tip();
   private readonly draw2d: CanvasRenderingContext2D;
   private readonly pointers = new Map<number, number>();
   private from = 0;
@@ -52,7 +53,7 @@ export class Roll {
     private readonly data: () => ReplayData,
     private readonly clock: () => Clock,
   ) {
-    this.root = make("div", { class: "roll" }, this.canvas, this.tip);
+    this.root = make("div", { class: "roll" }, this.canvas, this.tip.root);
     this.draw2d = this.canvas.getContext("2d")!;
     this.listen();
     new ResizeObserver(([entry]) => {
@@ -80,18 +81,13 @@ export class Roll {
     this.span = span;
   }
 
-  /** Tell about a note, as where the pointer rests on it. */
-  tell(hit: Hit, x?: number): void {
+  /** Tell about a note: where the pointer rests on it, or for a while at the playhead. */
+  tell(hit: Hit | null, x?: number): void {
     if (!hit) {
-      this.tip.classList.remove("seen");
+      this.tip.hide();
       return;
     }
-    const { notes, heard } = this.data();
-    const text = hit.kind === "wanted" ? wantedText(notes, hit.place) : heardText(heard, hit.place);
-    if (this.tip.textContent !== text) this.tip.textContent = text;
-    const at = x ?? this.x(this.clock().currentTime);
-    this.tip.style.left = `${Math.min(Math.max(at, 90), this.width - 90)}px`;
-    this.tip.classList.add("seen");
+    this.tip.show(hitText(this.data(), hit), x ?? this.x(this.clock().currentTime), this.width);
     this.tipUntil = x === undefined ? performance.now() + TOLD : Infinity;
   }
 
@@ -268,22 +264,11 @@ export class Roll {
     return this.from + (x / this.width) * this.span;
   }
 
-  private hit(x: number, y: number): Hit {
-    const { notes, heard, noteSpans, heardSpans } = this.data();
+  private hit(x: number, y: number): Hit | null {
     const slack = (REACH / this.width) * this.span;
     const key = this.highest - Math.floor(y / this.row());
     const time = this.time(x);
-    let found: Hit = null;
-    noteSpans.visit(time - slack, time + slack, (place) => {
-      if (notes.key[place] === key) found = { kind: "wanted", place };
-    });
-    heardSpans.visit(time - slack, time + slack, (place) => {
-      if (heard.key[place] !== key) return;
-      // A missed note says more than one that sounded, unless that was wrong.
-      const missed = found?.kind === "wanted" && isMissed(notes, found.place);
-      if (!missed || heard.verdict[place] === "wrong") found = { kind: "heard", place };
-    });
-    return found;
+    return hitAt(this.data(), key, time - slack, time + slack);
   }
 
   private listen(): void {
@@ -330,23 +315,17 @@ export class Roll {
       const { x, y } = at(event);
       if (!dragging) {
         const hit = this.hit(x, y);
-        const { notes, heard } = this.data();
-        const time =
-          hit === null
-            ? this.time(x)
-            : hit.kind === "wanted"
-              ? notes.onset[hit.place]!
-              : heard.on[hit.place]!;
         this.follows = true;
-        this.clock().seek(time);
-        if (hit) this.tell(hit, x);
+        this.clock().seek(hit ? hitTime(this.data(), hit) : this.time(x));
+        // A finger does not rest on the note.
+        if (hit) this.tell(hit, event.pointerType === "touch" ? undefined : x);
       }
     });
     for (const end of ["pointerup", "pointercancel"] as const) {
       canvas.addEventListener(end, (event) => pointers.delete(event.pointerId));
     }
-    canvas.addEventListener("pointerleave", () => {
-      this.tell(null);
+    canvas.addEventListener("pointerleave", (event) => {
+      if (event.pointerType !== "touch") this.tell(null);
     });
     canvas.addEventListener(
       "wheel",

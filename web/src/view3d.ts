@@ -5,7 +5,9 @@ import {
   HemisphereLight,
   PCFShadowMap,
   PerspectiveCamera,
+  Raycaster,
   Scene,
+  Vector2,
   WebGLRenderer,
 } from "three";
 import type { ShaderMaterial } from "three";
@@ -36,7 +38,7 @@ const SOFTWARE = 2;
 const SLOW = 45;
 const PATIENCE = 900;
 /** [s] How long at least a missed note is marked at its key. */
-const MARKED = 0.5;
+export const MARKED = 0.5;
 /** [m] A finger's number hovers so far above its tip. */
 const ABOVE_TIP = 0.014;
 
@@ -87,6 +89,8 @@ export class View3D {
   private readonly tips: Float64Array;
   private readonly wrists = new Float64Array(6);
   private readonly wristBodies: [number, number];
+  private readonly raycaster = new Raycaster();
+  private readonly pointer = new Vector2();
   private readonly sounding = new Int8Array(KEYS);
   private quality: number;
   private slowFor = 0;
@@ -164,6 +168,13 @@ export class View3D {
   /** Move the camera; says whether it moved. */
   moveCamera(passed: number): boolean {
     return this.rig.update(passed, this.width / this.height, this.wrists);
+  }
+
+  /** The key that is seen at a place of the picture [px], hands left out; -1 for none. */
+  keyAt(x: number, y: number): number {
+    this.pointer.set((2 * x) / this.width - 1, 1 - (2 * y) / this.height);
+    this.raycaster.setFromCamera(this.pointer, this.camera);
+    return this.piano.keyAt(this.raycaster);
   }
 
   /** Draw in a given size [px], and as well as can be, until `resize` is called again. */

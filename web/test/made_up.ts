@@ -1,6 +1,8 @@
 /** Small replays that tests are made of. */
 
-import type { Body, Quad, Triple } from "../src/format";
+import { BlockParser } from "../src/blocks";
+import type { Body, Heard, Notes, Quad, Triple } from "../src/format";
+import { ReplayData } from "../src/replay_data";
 
 const encoder = new TextEncoder();
 
@@ -60,4 +62,40 @@ export function joined(...parts: Uint8Array[]): Uint8Array<ArrayBuffer> {
 export function body(parent: number, pos: Triple, joints: Body["joints"] = []): Body {
   const quat: Quad = [1, 0, 0, 0];
   return { name: `body ${parent}`, parent, pos, quat, joints };
+}
+
+/** What a reader knows after some blocks. */
+export function taken(...parts: Uint8Array[]): ReplayData {
+  const data = new ReplayData();
+  for (const each of new BlockParser().push(joined(...parts))) data.take(each);
+  return data;
+}
+
+/** A note of the score: key, onset, offset, and why it was missed, if it was. */
+export function notes(...given: [number, number, number, string?][]): Uint8Array {
+  return jsonBlock("NOTE", {
+    key: given.map(([key]) => key),
+    onset: given.map(([, onset]) => onset),
+    offset: given.map(([, , offset]) => offset),
+    velocity: given.map(() => 64),
+    hand: given.map(() => 1),
+    finger: given.map(() => 0),
+    verdict: given.map(([, , , cause]) => (cause === undefined ? "played" : "missed")),
+    cause: given.map(([, , , cause]) => cause ?? null),
+  } satisfies Notes);
+}
+
+/** A note that sounded: key, from, to, and why it is wrong, if it is. */
+export function heard(from: number, ...given: [number, number, number, string?][]): Uint8Array {
+  return jsonBlock("HEAR", {
+    from,
+    key: given.map(([key]) => key),
+    on: given.map(([, on]) => on),
+    off: given.map(([, , off]) => off),
+    velocity: given.map(() => 60),
+    hand: given.map(() => 0),
+    finger: given.map(() => 1),
+    verdict: given.map(([, , , cause]) => (cause === undefined ? "right" : "wrong")),
+    cause: given.map(([, , , cause]) => cause ?? null),
+  } satisfies Heard & { from: number });
 }

@@ -2,27 +2,11 @@ import { describe, expect, it } from "vitest";
 
 import { BlockParser } from "../src/blocks";
 import { ReplayData } from "../src/replay_data";
-import { block, head, joined, jsonBlock, moveContent } from "./made_up";
+import { block, head, heard, joined, jsonBlock, moveContent, taken } from "./made_up";
 
-function taken(...parts: Uint8Array[]): ReplayData {
-  const data = new ReplayData();
-  for (const each of new BlockParser().push(joined(...parts))) data.take(each);
-  return data;
-}
-
-function heard(from: number, keys: number[]): Uint8Array {
-  const same = <T>(value: T): T[] => keys.map(() => value);
-  return jsonBlock("HEAR", {
-    from,
-    key: keys,
-    on: keys.map((key) => key / 10),
-    off: keys.map((key) => key / 10 + 0.3),
-    velocity: same(60),
-    hand: same(0),
-    finger: same(1),
-    verdict: same(null),
-    cause: same(null),
-  });
+/** Notes that sounded, told by their keys. */
+function sounded(from: number, keys: number[]): Uint8Array {
+  return heard(from, ...keys.map((key): [number, number, number] => [key, key / 10, key / 10 + 0.3]));
 }
 
 describe("ReplayData", () => {
@@ -37,7 +21,7 @@ describe("ReplayData", () => {
   });
 
   it("replaces what was heard from a given note on", () => {
-    const data = taken(head(), heard(0, [1, 2, 3]), heard(2, [4, 5]));
+    const data = taken(head(), sounded(0, [1, 2, 3]), sounded(2, [4, 5]));
     expect(data.heard.key).toEqual([1, 2, 4, 5]);
     const found: number[] = [];
     data.heardSpans.visit(0.45, 0.45, (place) => found.push(data.heard.key[place]!));
@@ -45,9 +29,9 @@ describe("ReplayData", () => {
   });
 
   it("has another revision with each change, and than any other replay", () => {
-    const [one, other] = [taken(head(), heard(0, [1])), taken(head(), heard(0, [2]))];
+    const [one, other] = [taken(head(), sounded(0, [1])), taken(head(), sounded(0, [2]))];
     const seen = [one.revision, other.revision, new ReplayData().revision];
-    for (const block of new BlockParser().push(joined(heard(1, [3])))) one.take(block);
+    for (const block of new BlockParser().push(joined(sounded(1, [3])))) one.take(block);
     seen.push(one.revision);
     expect(new Set(seen).size).toBe(seen.length);
   });
