@@ -163,6 +163,31 @@ def test_a_key_that_is_pointed_at_tells_why_its_note_was_missed(page: Any) -> No
     page.mouse.up()
 
 
+def test_the_roll_has_fingers_where_there_is_room(page: Any) -> None:
+    page.evaluate(
+        """() => {
+          window.written = [];
+          const { fillText } = CanvasRenderingContext2D.prototype;
+          CanvasRenderingContext2D.prototype.fillText = function (text, ...place) {
+            if (/^[1-5]$/.test(text)) window.written.push([text, this.fillStyle]);
+            fillText.call(this, text, ...place);
+          };
+        }"""
+    )
+
+    def written(height: str) -> list[list[str]]:
+        page.evaluate("() => { window.written = []; }")
+        page.locator(".roll").evaluate("(roll, height) => { roll.style.height = height; }", height)
+        page.wait_for_timeout(300)
+        numbers: list[list[str]] = page.evaluate("window.written")
+        return numbers
+
+    assert not written("6rem")
+    assert len({number for number, _ in written("40rem")}) > 2
+    page.get_by_label("Finger numbers").click()
+    assert not written("38rem")
+
+
 def test_a_long_report_opened_from_a_disk_says_what_to_do(
     chromium: Any, performance: Performance, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

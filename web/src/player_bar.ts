@@ -195,7 +195,7 @@ export class PlayerBar {
     press(this.loop, state.looping);
     press(this.falling, state.falling);
     press(this.numbers, state.numbers);
-    for (const needsPicture of [this.falling, this.numbers, this.film]) {
+    for (const needsPicture of [this.falling, this.film]) {
       if (needsPicture.hidden === state.pictured) needsPicture.hidden = !state.pictured;
     }
     const none = state.faults === 0;

@@ -540,7 +540,7 @@ export class ReplayElement extends HTMLElement implements Showing {
     }
     this.isStale = false;
     this.fallback?.update(time, this.clock.playing && !this.clock.waiting, this.clock.rate);
-    this.roll.draw(time);
+    this.roll.draw(time, this.shown.numbers);
     this.updateControls(time);
     if (changed) {
       this.costs[this.frames % COSTS] = performance.now() - start;

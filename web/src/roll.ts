@@ -1,7 +1,11 @@
 /** The piano roll below the picture, which is also the timeline. */
 
+import { Color } from "three";
+
 import type { Clock } from "./clock";
+import { inkOn } from "./contrast";
 import { make } from "./dom";
+import type { Heard } from "./format";
 import { KEYS } from "./format";
 import type { Hit } from "./hits";
 import { hitAt, hitText, hitTime } from "./hits";
@@ -9,6 +13,7 @@ import type { Look, Paint } from "./look";
 import { handPaint, heardPaint, isMissed, paints } from "./look";
 import { DRAG } from "./pointing";
 import type { ReplayData } from "./replay_data";
+import type { Spans } from "./spans";
 import { Tip } from "./tip";
 import { clockTime } from "./wording";
 
@@ -22,6 +27,10 @@ const HEAD_AT = 0.3;
 /** [px] A pointer that is nearer to a note than this means it. */
 const REACH = 4;
 const MARGIN_KEYS = 2;
+const BAR_ALPHA = 0.85;
+/** [px] A finger's number is to be read, and not to shout. */
+const SMALLEST_NUMBER = 7;
+const LARGEST_NUMBER = 12;
 /** [ms] The note at a playhead that was brought there is told of for so long. */
 const TOLD = 4000;
 
@@ -42,8 +51,10 @@ export class Roll {
   private highest = 63;
   private revision = -1;
   private colors: string[] = [];
+  /** Of numbers on bars of each colour. */
+  private inks: string[] = [];
   private look: Look | null = null;
-  private readonly drawn = new Float64Array(9);
+  private readonly drawn = new Float64Array(10);
   private isStale = true;
   private tipUntil = 0;
   private width = 1;
@@ -65,6 +76,12 @@ export class Roll {
   setLook(look: Look): void {
     this.look = look;
     this.colors = paints(look);
+    // A canvas mixes colors as a screen shows them.
+    const paper = new Color(look.paper).convertLinearToSRGB();
+    this.inks = this.colors.map((color) => {
+      const bar = new Color(color).convertLinearToSRGB().lerp(paper, 1 - BAR_ALPHA);
+      return inkOn(bar.convertSRGBToLinear(), [look.text, look.paper]);
+    });
     this.isStale = true;
   }
 
@@ -91,8 +108,12 @@ export class Roll {
     this.tipUntil = x === undefined ? performance.now() + TOLD : Infinity;
   }
 
-  /** Draw, if there is anything new to be seen. */
-  draw(time: number): void {
+  /**
+   * Draw, if there is anything new to be seen.
+   *
+   * @param numbers whether with the fingers' numbers.
+   */
+  draw(time: number, numbers: boolean): void {
     if (!this.look) return;
     const data = this.data();
     if (this.revision !== data.revision) this.fitKeys(data);
@@ -115,9 +136,10 @@ export class Roll {
     see(6, loop ? loop[0] : -1);
     see(7, loop ? loop[1] : -1);
     see(8, known);
+    see(9, numbers ? 1 : 0);
     if (!changed) return;
     this.isStale = false;
-    this.paint(data, time, known, loop);
+    this.paint(data, time, known, loop, numbers);
   }
 
   private paint(
@@ -125,6 +147,7 @@ export class Roll {
     time: number,
     known: number,
     loop: [number, number] | null,
+    numbers: boolean,
   ): void {
     const { draw2d: draw, width, height } = this;
     const look = this.look!;
@@ -142,6 +165,7 @@ export class Roll {
       draw.globalAlpha = 1;
     }
     for (let paint = 0; paint < 4; paint++) this.paintNotes(data, paint as Paint);
+    if (numbers) this.paintNumbers(data);
     this.paintPedal(data);
     draw.globalAlpha = 0.35;
     draw.fillStyle = look.line;
@@ -164,6 +188,7 @@ export class Roll {
     const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60, 300].find((s) => s / this.span > 0.075) ?? 600;
     draw.font = "11px system-ui, sans-serif";
     draw.textBaseline = "middle";
+    draw.textAlign = "left";
     for (let time = Math.max(Math.ceil(this.from / step), 0) * step; ; time += step) {
       const x = this.x(time);
       if (x > width) break;
@@ -188,7 +213,7 @@ export class Roll {
       const length = Math.max(this.x(heard.off[i]!) - x, 2);
       draw.rect(x, this.y(heard.key[i]!) + inset, length, row - 2 * inset);
     });
-    draw.globalAlpha = 0.85;
+    draw.globalAlpha = BAR_ALPHA;
     draw.fill();
     draw.globalAlpha = 1;
     draw.beginPath();
@@ -207,6 +232,46 @@ export class Roll {
     }
     draw.lineWidth = paint === 3 ? 1.5 : 1;
     draw.stroke();
+  }
+
+  /** Fingers, at the beginnings of notes that have room for them. */
+  private paintNumbers(data: ReplayData): void {
+    const { draw2d: draw } = this;
+    const { notes, heard } = data;
+    const row = this.row();
+    const size = Math.min(Math.floor(row), LARGEST_NUMBER);
+    if (size < SMALLEST_NUMBER) return;
+    draw.font = `600 ${size}px system-ui, sans-serif`;
+    draw.textAlign = "center";
+    const to = this.from + this.span;
+    const number = (key: number, from: number, to: number, finger: number, ink: string): void => {
+      const x = this.x(from);
+      if (finger < 0 || this.x(to) - x < size) return;
+      draw.fillStyle = ink;
+      draw.fillText(String(finger + 1), x + size / 2, this.y(key) + row * 0.55);
+    };
+    data.noteSpans.visit(this.from, to, (i) => {
+      // A note that was played has its number on the bar of what sounded.
+      if (notes.verdict[i] === "played") return;
+      const [key, onset] = [notes.key[i]!, notes.onset[i]!];
+      const ink = this.inkAt(heard, data.heardSpans, key, onset, size);
+      if (ink !== null) number(key, onset, notes.offset[i]!, notes.finger[i]!, ink);
+    });
+    data.heardSpans.visit(this.from, to, (i) => {
+      const ink = this.inks[heardPaint(heard, i)]!;
+      number(heard.key[i]!, heard.on[i]!, heard.off[i]!, heard.finger[i]!, ink);
+    });
+  }
+
+  /** What is read where the number of a note of the score would be; null where another is. */
+  private inkAt(heard: Heard, spans: Spans, key: number, time: number, size: number): string | null {
+    let ink: string | null = this.look!.text;
+    spans.visit(time, time + (size / this.width) * this.span, (i) => {
+      if (heard.key[i] !== key) return;
+      const hasNumber = heard.finger[i]! >= 0 && heard.on[i]! > time;
+      ink = hasNumber ? null : this.inks[heardPaint(heard, i)]!;
+    });
+    return ink;
   }
 
   private paintPedal(data: ReplayData): void {
@@ -245,6 +310,7 @@ export class Roll {
     const more = Math.max(Math.ceil((24 - (high - low)) / 2), MARGIN_KEYS);
     this.lowest = Math.max(low - more, 0);
     this.highest = Math.min(high + more, KEYS - 1);
+    this.root.style.setProperty("--rows", String(this.highest - this.lowest + 1));
   }
 
   private row(): number {
