@@ -1,30 +1,24 @@
 /** Round badges in space, always facing the eye: finger numbers, and crosses at missed keys. */
 
-import {
-  Color,
-  DynamicDrawUsage,
-  InstancedBufferAttribute,
-  InstancedBufferGeometry,
-  Mesh,
-  PlaneGeometry,
-  ShaderMaterial,
-} from "three";
+import { DynamicDrawUsage, InstancedBufferAttribute } from "three";
 import type { Texture } from "three";
 
 import { SIGNS } from "./digits";
 import type { Look, Paint } from "./look";
-import { paints } from "./look";
+import { PaintedQuads } from "./painted_quads";
 
 const MOST = 32;
+
+const VARYINGS = /* glsl */ `
+  varying vec2 corner;
+  varying vec3 tone;
+  varying float sign;
+`;
 
 const VERTEX = /* glsl */ `
   attribute vec4 place;
   attribute float paint;
-  uniform vec3 paints[4];
   uniform float radius;
-  varying vec2 corner;
-  varying vec3 tone;
-  varying float sign;
   void main() {
     vec4 middle = modelViewMatrix * vec4(place.xyz, 1.0);
     corner = position.xy;
@@ -42,9 +36,6 @@ const VERTEX = /* glsl */ `
 
 const FRAGMENT = /* glsl */ `
   uniform sampler2D signs;
-  varying vec2 corner;
-  varying vec3 tone;
-  varying float sign;
   void main() {
     float r = length(corner);
     float edge = fwidth(r);
@@ -57,39 +48,26 @@ const FRAGMENT = /* glsl */ `
 `;
 
 export class Badges {
-  readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
   private readonly place = new InstancedBufferAttribute(new Float32Array(4 * MOST), 4);
   private readonly paint = new InstancedBufferAttribute(new Float32Array(MOST), 1);
-  private readonly colors = [new Color(), new Color(), new Color(), new Color()];
+  private readonly quads: PaintedQuads;
 
   constructor(signs: Texture) {
-    const shape = new InstancedBufferGeometry();
-    const quad = new PlaneGeometry(2, 2);
-    shape.index = quad.index;
-    shape.setAttribute("position", quad.getAttribute("position"));
-    shape.setAttribute("place", this.place.setUsage(DynamicDrawUsage));
-    shape.setAttribute("paint", this.paint.setUsage(DynamicDrawUsage));
-    shape.instanceCount = 0;
-    this.mesh = new Mesh(
-      shape,
-      new ShaderMaterial({
-        vertexShader: VERTEX,
-        fragmentShader: FRAGMENT,
-        uniforms: {
-          signs: { value: signs },
-          paints: { value: this.colors },
-          radius: { value: 0.0078 },
-        },
-        transparent: true,
-        depthWrite: false,
-      }),
-    );
-    this.mesh.frustumCulled = false;
-    this.mesh.renderOrder = 2;
+    this.quads = new PaintedQuads(2, VARYINGS, VERTEX, FRAGMENT, {
+      signs: { value: signs },
+      radius: { value: 0.0078 },
+    });
+    this.place.setUsage(DynamicDrawUsage);
+    this.paint.setUsage(DynamicDrawUsage);
+    this.quads.setQuads({ place: this.place, paint: this.paint }, 0);
+  }
+
+  get mesh(): PaintedQuads["mesh"] {
+    return this.quads.mesh;
   }
 
   setLook(look: Look): void {
-    paints(look).forEach((paint, i) => this.colors[i]!.set(paint));
+    this.quads.colors.setLook(look);
   }
 
   /** Begin a new set of badges. */

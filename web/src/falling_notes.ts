@@ -1,19 +1,13 @@
 /** Notes as bars that fall onto their keys, in an upright plane at the keyboard's far edge. */
 
-import {
-  Color,
-  InstancedBufferAttribute,
-  InstancedBufferGeometry,
-  Mesh,
-  PlaneGeometry,
-  ShaderMaterial,
-} from "three";
+import { InstancedBufferAttribute } from "three";
 import type { Texture } from "three";
 
 import { SIGNS } from "./digits";
 import type { Notes, SceneContent } from "./format";
 import type { Look } from "./look";
-import { handPaint, isMissed, paints } from "./look";
+import { handPaint, isMissed } from "./look";
+import { PaintedQuads } from "./painted_quads";
 
 /** [m] Height of the plane. */
 export const HEIGHT = 0.44;
@@ -24,12 +18,7 @@ const BEHIND = 0.006;
 /** [m] How far its lower edge is above the keys, so that nothing behind them hides it. */
 const ABOVE = 0.008;
 
-const VERTEX = /* glsl */ `
-  attribute vec4 span;
-  attribute vec3 mark;
-  uniform float time;
-  uniform vec3 origin;
-  uniform vec3 paints[4];
+const VARYINGS = /* glsl */ `
   varying vec2 inside;
   varying vec2 size;
   varying vec3 tone;
@@ -38,20 +27,27 @@ const VERTEX = /* glsl */ `
   varying float finger;
   varying float up;
   varying float sounding;
+`;
+
+const VERTEX = /* glsl */ `
+  attribute vec4 span;
+  attribute vec3 mark;
+  uniform float time;
+  uniform vec3 origin;
   void main() {
     float low = max((span.x - time) * ${(HEIGHT / AHEAD).toFixed(5)}, 0.0);
     float high = min((span.y - time) * ${(HEIGHT / AHEAD).toFixed(5)}, ${HEIGHT.toFixed(3)});
     // What is not between the plane's edges shrinks to nothing.
     high = max(high, low);
     size = vec2(2.0 * span.w, high - low);
-    inside = (position.xy + 0.5) * size;
+    inside = (0.5 * position.xy + 0.5) * size;
     up = low + inside.y;
     black = step(4.0, mark.x);
     tone = paints[int(mod(mark.x, 4.0) + 0.5)];
     finger = mark.y;
     missed = mark.z;
     sounding = span.x <= time ? 1.0 : 0.0;
-    vec3 at = origin + vec3(0.0, span.z + position.x * size.x, up);
+    vec3 at = origin + vec3(0.0, span.z + position.x * span.w, up);
     gl_Position = projectionMatrix * modelViewMatrix * vec4(at, 1.0);
   }
 `;
@@ -59,15 +55,6 @@ const VERTEX = /* glsl */ `
 const FRAGMENT = /* glsl */ `
   uniform sampler2D signs;
   uniform float numbers;
-  uniform vec3 wrong;
-  varying vec2 inside;
-  varying vec2 size;
-  varying vec3 tone;
-  varying float black;
-  varying float missed;
-  varying float finger;
-  varying float up;
-  varying float sounding;
   void main() {
     float round = min(0.0035, 0.5 * min(size.x, size.y));
     vec2 q = abs(inside - 0.5 * size) - 0.5 * size + round;
@@ -79,7 +66,7 @@ const FRAGMENT = /* glsl */ `
     float rim = smoothstep(-0.0016 - soft, -0.0016, out_);
     if (missed > 0.5) {
       // Hollow, as in the roll: it was asked for and did not sound.
-      color = mix(color, wrong, rim);
+      color = mix(color, paints[3], rim);
       alpha *= mix(0.25, 1.0, rim);
     } else {
       color = mix(color, color * 0.8, rim);
@@ -100,9 +87,8 @@ const FRAGMENT = /* glsl */ `
 `;
 
 export class FallingNotes {
-  readonly mesh: Mesh<InstancedBufferGeometry, ShaderMaterial>;
-  private readonly colors = [new Color(), new Color(), new Color(), new Color()];
-  private readonly uniforms;
+  private readonly uniforms = { time: { value: 0 }, numbers: { value: 1 } };
+  private readonly quads: PaintedQuads;
 
   constructor(
     private readonly scene: SceneContent,
@@ -114,31 +100,19 @@ export class FallingNotes {
       back = Math.min(back, place[0] - half[0]);
       top = Math.max(top, place[2]);
     }
-    this.uniforms = {
-      time: { value: 0 },
+    this.quads = new PaintedQuads(1, VARYINGS, VERTEX, FRAGMENT, {
+      ...this.uniforms,
       origin: { value: [back - BEHIND, 0, top + ABOVE] },
-      paints: { value: this.colors },
-      wrong: { value: this.colors[3] },
       signs: { value: signs },
-      numbers: { value: 1 },
-    };
-    this.mesh = new Mesh(
-      new InstancedBufferGeometry(),
-      new ShaderMaterial({
-        vertexShader: VERTEX,
-        fragmentShader: FRAGMENT,
-        uniforms: this.uniforms,
-        transparent: true,
-        depthWrite: false,
-        side: 2,
-      }),
-    );
-    this.mesh.frustumCulled = false;
-    this.mesh.renderOrder = 1;
+    });
+  }
+
+  get mesh(): PaintedQuads["mesh"] {
+    return this.quads.mesh;
   }
 
   setLook(look: Look): void {
-    paints(look).forEach((paint, i) => this.colors[i]!.set(paint));
+    this.quads.colors.setLook(look);
   }
 
   setNotes(notes: Notes): void {
@@ -155,15 +129,13 @@ export class FallingNotes {
       mark[3 * i + 1] = notes.finger[i]!;
       mark[3 * i + 2] = isMissed(notes, i) ? 1 : 0;
     }
-    const quad = new PlaneGeometry(1, 1);
-    const shape = new InstancedBufferGeometry();
-    shape.index = quad.index;
-    shape.setAttribute("position", quad.getAttribute("position"));
-    shape.setAttribute("span", new InstancedBufferAttribute(span, 4));
-    shape.setAttribute("mark", new InstancedBufferAttribute(mark, 3));
-    shape.instanceCount = count;
-    this.mesh.geometry.dispose();
-    this.mesh.geometry = shape;
+    this.quads.setQuads(
+      {
+        span: new InstancedBufferAttribute(span, 4),
+        mark: new InstancedBufferAttribute(mark, 3),
+      },
+      count,
+    );
   }
 
   update(time: number, numbers: boolean): void {

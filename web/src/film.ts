@@ -71,7 +71,7 @@ async function encodePictures(filmed: Filmed, packets: Packet[]): Promise<VideoT
     },
   });
   encoder.configure(chosen[0]);
-  try {
+  await encoding(encoder, trouble, async () => {
     const frames = Math.max(Math.round((to - from) * fps), 1);
     for (let i = 0; i < frames; i++) {
       signal.throwIfAborted();
@@ -88,10 +88,7 @@ async function encodePictures(filmed: Filmed, packets: Packet[]): Promise<VideoT
       while (encoder.encodeQueueSize > WAITING);
       if (trouble.reason) throw trouble.reason;
     }
-    await encoder.flush();
-  } finally {
-    if (encoder.state !== "closed") encoder.close();
-  }
+  });
   return chosen[1];
 }
 
@@ -118,7 +115,7 @@ async function encodeSound(filmed: Filmed, packets: Packet[]): Promise<AudioTrac
     numberOfChannels: CHANNELS,
     bitrate: AUDIO_BITS,
   });
-  try {
+  await encoding(encoder, trouble, () => {
     const first = Math.round(filmed.from * RATE);
     const last = Math.min(Math.round(filmed.to * RATE), sound.length);
     for (let at = first; at < last; at += PIECE) {
@@ -140,12 +137,23 @@ async function encodeSound(filmed: Filmed, packets: Packet[]): Promise<AudioTrac
       encoder.encode(piece);
       piece.close();
     }
+  });
+  return found.head ? { rate: RATE, channels: CHANNELS, head: found.head } : null;
+}
+
+/** Feed an encoder until it has encoded all, and close it in any case. */
+async function encoding(
+  encoder: VideoEncoder | AudioEncoder,
+  trouble: { reason?: Error },
+  feed: () => Promise<void> | void,
+): Promise<void> {
+  try {
+    await feed();
     await encoder.flush();
     if (trouble.reason) throw trouble.reason;
   } finally {
     if (encoder.state !== "closed") encoder.close();
   }
-  return found.head ? { rate: RATE, channels: CHANNELS, head: found.head } : null;
 }
 
 function packet(track: Packet["track"], chunk: EncodedVideoChunk | EncodedAudioChunk): Packet {

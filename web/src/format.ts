@@ -1,4 +1,4 @@
-/** The content of a replay's blocks, as docs/reference/replay-format.md describes them. */
+/** What is read of a replay's blocks, which docs/reference/replay-format.md describes. */
 
 export type Triple = [number, number, number];
 export type Quad = [number, number, number, number];
@@ -9,9 +9,6 @@ export interface Head {
   title: string;
   player: string;
   effort: number;
-  world: string;
-  touch: string;
-  works_pedal: boolean;
   seconds: number;
   rate: number;
   positions: number;
@@ -98,6 +95,4 @@ export interface Plan {
   total: number;
 }
 
-export const LEFT = 0;
-export const RIGHT = 1;
 export const KEYS = 88;

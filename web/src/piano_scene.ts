@@ -21,7 +21,7 @@ import type { Geom, SceneContent } from "./format";
 import { KEYS } from "./format";
 import type { Kinematics } from "./kinematics";
 import type { Look, Paint } from "./look";
-import { paints } from "./look";
+import { PaintColors } from "./paint_colors";
 import { joined, keyShape, materialColor, placeOf } from "./shapes";
 
 const ONE = new Vector3(1, 1, 1);
@@ -82,7 +82,7 @@ export class PianoScene {
   private readonly softness = { depth: { value: 0 } };
   private readonly floorShadow = new ShadowMaterial();
   private readonly lit = new Int8Array(KEYS).fill(-1);
-  private readonly paints = [new Color(), new Color(), new Color(), new Color()];
+  private readonly paints = new PaintColors();
   private readonly matrix = new Matrix4();
   private readonly position = new Vector3();
   private readonly rotation = new Quaternion();
@@ -124,7 +124,7 @@ export class PianoScene {
   }
 
   setLook(look: Look): void {
-    paints(look).forEach((paint, i) => this.paints[i]!.set(paint));
+    this.paints.setLook(look);
     this.floorShadow.opacity = look.dark ? 0.45 : 0.22;
     this.softness.depth.value = look.dark ? 0.5 : 0.26;
     this.lit.fill(-1);
@@ -155,7 +155,7 @@ export class PianoScene {
       const sound = sounding[keys[i]!]!;
       if (sound === this.lit[keys[i]!]) continue;
       this.color.copy(colors[i]!);
-      if (sound >= 0) this.color.lerp(this.paints[sound as Paint]!, lamps[i] ? 1 : LIT);
+      if (sound >= 0) this.color.lerp(this.paints.list[sound as Paint], lamps[i] ? 1 : LIT);
       this.paint(i, this.color);
     }
     for (let key = 0; key < KEYS; key++) this.lit[key] = sounding[key]!;

@@ -399,10 +399,7 @@ export class ReplayElement extends HTMLElement implements Showing {
         this.isStale = true;
       });
     } else {
-      this.fallback = new Fallback(
-        this.getAttribute("fallback") ?? this.inside("picture", "img"),
-        this.getAttribute("film") ?? this.inside("film", "video"),
-      );
+      this.fallback = new Fallback(this.inside("picture", "img"), this.inside("film", "video"));
       this.viewBox.prepend(this.fallback.root);
     }
   }
@@ -517,7 +514,6 @@ export class ReplayElement extends HTMLElement implements Showing {
     const { state } = this;
     if (state !== this.lastState) {
       this.lastState = state;
-      if (state === "growing" || state === "done") this.start();
       this.dispatchEvent(new Event("statechange"));
     }
     if (!this.isVisible && !this.settle) return;
@@ -560,13 +556,6 @@ export class ReplayElement extends HTMLElement implements Showing {
       this.settle = null;
     }
   };
-
-  /** Begin to play, where that is wanted and nobody has done so. */
-  private start(): void {
-    if (this.isUntouched && this.hasAttribute("autoplay") && !this.calm.matches) {
-      this.clock.play();
-    }
-  }
 
   private updateControls(time: number): void {
     const { clock, data } = this;
