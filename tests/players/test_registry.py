@@ -11,6 +11,7 @@ import pytest
 import pianomime
 from pianomime import InputError, PlannedPlayer, Score, evaluate, excerpt, load_player, songs
 from pianomime.players import player_names, register_player, registry
+from pianomime.players.receding_horizon import RecedingHorizonPlayer
 from pianomime.players.registry import player_files, player_settings
 from pianomime.policies.methods import bundled_weights, weights_folder
 
@@ -174,6 +175,14 @@ def test_settings_reach_planner_tracker_and_search() -> None:
     assert player.planner.config.fingering.beam == 7
     assert player.tracker._tracker.config.force == 6.0
     assert player.tracker.config.rounds == 1
+
+
+def test_settings_that_are_right_only_together_are_taken() -> None:
+    settings = {"horizon.first": 60.0, "horizon.longest": 60, "tracker.shortest": "0.2"}
+    player = load_player("zero-shot", effort=0, **settings, **{"tracker.stroke.longest": 0.3})
+    assert isinstance(player, RecedingHorizonPlayer)
+    assert player.horizon.longest == 60.0
+    assert player.tracker.config.stroke.shortest == 0.2
 
 
 def test_a_setting_changes_what_is_played() -> None:

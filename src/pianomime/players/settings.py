@@ -102,23 +102,26 @@ def _path(field: str, config: Any, name: str, configs: dict[str, Any]) -> str:
 
 
 def _replaced(config: _Config, values: dict[str, Any], group: str) -> _Config:
-    """A config with other values at some paths; it checks itself."""
-    made: Any = config
+    """A config with other values at some paths.
+
+    All values of a config are put in together, for it checks itself, and one may be right only
+    with another.
+    """
+    made: dict[str, Any] = {}
+    inner: dict[str, dict[str, Any]] = {}
     for path, value in values.items():
-        made = _replace(made, path.split("."), value, f"{group}.{path}")
-    return typing.cast(_Config, made)
-
-
-def _replace(config: Any, path: list[str], value: Any, name: str) -> Any:
-    field, *rest = path
-    if rest:
-        inner = _replace(getattr(config, field), rest, value, name)
-    else:
-        inner = _converted(value, getattr(config, field), name)
+        field, _, rest = path.partition(".")
+        if rest:
+            inner.setdefault(field, {})[rest] = value
+        else:
+            made[field] = _converted(value, getattr(config, field), f"{group}.{field}")
+    for field, within in inner.items():
+        made[field] = _replaced(getattr(config, field), within, f"{group}.{field}")
     try:
-        return dataclasses.replace(config, **{field: inner})
+        changed = dataclasses.replace(typing.cast(Any, config), **made)
     except InputError as error:
-        raise InputError(f"{name.rpartition('.')[0]}: {error}") from error
+        raise InputError(f"{group}: {error}") from error
+    return typing.cast(_Config, changed)
 
 
 def _converted(value: Any, known: Any, name: str) -> Any:

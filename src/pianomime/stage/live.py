@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
-from typing import IO, Self
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE, FRAME_SECONDS
 from pianomime.music import Score
-from pianomime.music.sound import PEAK, SAMPLE_RATE, live_sound
+from pianomime.music.sound import PEAK, live_sound
 from pianomime.players.player import Player
 from pianomime.players.rollout import Step
 from pianomime.players.sounding_notes import SoundingNotes
@@ -50,19 +49,18 @@ _RINGING = 60.0
 class LiveReplay:
     """Writes the replay and the sound of a score while a player plays it.
 
-    It is an `Observer`, and its `progress` is to be told as well. Use it as a context manager,
-    which ends the sound.
+    It is an `Observer`, and its `progress` is to be told as well.
 
     Args:
         score: what is played.
         player: who plays.
         replay: file for the blocks, unbuffered.
-        sound: file for MP3, unbuffered.
+        sound: what takes the sound, at `SAMPLE_RATE`.
     """
 
-    def __init__(self, score: Score, player: Player, replay: IO[bytes], sound: IO[bytes]) -> None:
-        self._score, self._player, self._replay = score, player, replay
-        self._sound = Mp3(sound, SAMPLE_RATE)
+    def __init__(self, score: Score, player: Player, replay: IO[bytes], sound: Mp3) -> None:
+        self._score, self._player = score, player
+        self._replay, self._sound = replay, sound
         self._notes, self._pedal = SoundingNotes(), score.pedal
         self._poses: list[NDArray[np.float64]] = [np.zeros(LAYOUT.qpos_size)]
         self._written, self._substeps, self._frames = 0, 0, 0
@@ -104,17 +102,6 @@ class LiveReplay:
             self._write_sound()
         if self._frames % _BATCH_FRAMES == 0 or last:
             self._write_motion()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._sound.__exit__(kind, error, trace)
 
     def _write(self, *blocks: bytes) -> None:
         for block in blocks:

@@ -16,7 +16,7 @@ from pianomime.file_names import file_name
 from pianomime.files import staged
 from pianomime.keyboard import LEAD_IN_SECONDS
 from pianomime.music import Score
-from pianomime.music.sound import live_sound
+from pianomime.music.sound import SAMPLE_RATE, live_sound
 from pianomime.players.casting import Casting
 from pianomime.players.performance import Performance
 from pianomime.players.registry import load_player
@@ -24,6 +24,7 @@ from pianomime.progress import no_progress
 from pianomime.replay import Judgement, done_block, heard_block, notes_block, scene_block
 from pianomime.replay.blocks import json_block
 from pianomime.report import FILES, write_report
+from pianomime.report.mp3 import Mp3
 from pianomime.stage.live import LiveReplay
 from pianomime.staging import BusyError
 from pianomime.workers import Answer, Row
@@ -73,7 +74,8 @@ def _play(request: dict[str, Any], out: Path, replay: Any, sound: Any) -> Path:
     lead_in = LEAD_IN_SECONDS if casting.takes_lead_in else 0.0
     seconds = np.inf if request["seconds"] is None else request["seconds"]
     player, score = casting.cast(Path(request["song"]), 0.0, seconds, lead_in)
-    with LiveReplay(score, player, replay, sound) as live:
+    with Mp3(sound, SAMPLE_RATE) as encoder:
+        live = LiveReplay(score, player, replay, encoder)
         performance = player.play(score, live.progress, live)
     judgement = Judgement.of(performance)
     replay.write(notes_block(score, performance.plan, judgement))
