@@ -143,7 +143,8 @@ def check_web():
             why = "its packages cannot be installed"
         else:
             checks = ("lint", "test")
-            return max([subprocess.call(npm + ["run", "--silent", c], cwd=WEB) for c in checks])
+            codes = [subprocess.call(npm + ["run", "--silent", c], cwd=WEB) for c in checks]
+            return int(any(codes))
         remember_failure("checks", digest, why)
     sys.stderr.write(
         "do: the web checks were not run (%s); after `./do page` they are tried again\n" % why
@@ -283,7 +284,7 @@ def main():
         os.chdir(ROOT)
         checks = (["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy"])
         codes = [subprocess.call([PYTHON, "-m"] + check) for check in checks]
-        sys.exit(max(codes + [check_web()]))
+        sys.exit(int(any(codes + [check_web()])))
     elif command == "page":
         set_up("stage")
         forget_failures()

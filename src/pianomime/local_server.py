@@ -45,6 +45,8 @@ _LARGEST_HEADERS = 16_384
 """[bytes]"""
 _LARGEST_BODY = 100_000
 """[bytes]"""
+_DOOR = ".pianomime-open-"
+"""Begin of the names of files that lead a browser to a server."""
 _SANDBOXED = "null"
 """What browsers call the origin of a page that has none."""
 _PATIENCE = 10.0
@@ -97,6 +99,9 @@ class LocalHandler(RequestHandler):
         if origin == _SANDBOXED and self.for_sandboxed:
             self.set_header("Access-Control-Allow-Origin", _SANDBOXED)
             origin = None
+        if self.for_sandboxed:
+            # Sound comes without an origin, and is kept from pages of others by the secret alone.
+            self.set_header("Cross-Origin-Resource-Policy", "cross-origin")
         if host not in self.settings["hosts"]:
             raise HTTPError(403, reason="Not the address of this page")
         # A browser says where all comes from but what a page of the same server only asks for.
@@ -218,7 +223,9 @@ class LocalServer(Closing):
         Raises:
             OSError: the file cannot be written.
         """
-        handle, name = tempfile.mkstemp(".html", "open-", folder)
+        for left in folder.glob(f"{_DOOR}*.html"):  # by one that was killed
+            left.unlink(missing_ok=True)
+        handle, name = tempfile.mkstemp(".html", _DOOR, folder)
         self._door = Path(name)
         with open(handle, "w", encoding="utf-8") as file:
             file.write(f'<meta charset="utf-8"><meta http-equiv="refresh" content="0; {self.url}">')

@@ -34,10 +34,6 @@ _PAUSE = 0.02
 """[s] between tries."""
 
 
-class BusyError(InputError):
-    """Another process is writing the output."""
-
-
 @contextlib.contextmanager
 def claim(path: Path, patience: float = _PATIENCE) -> Iterator[Path]:
     """Hold an output, a file or a folder, as its only writer.
@@ -50,7 +46,7 @@ def claim(path: Path, patience: float = _PATIENCE) -> Iterator[Path]:
         patience: how long to wait for another writer to be done [s].
 
     Raises:
-        BusyError: another process holds the output.
+        InputError: another process holds the output.
         FileNotFoundError: there is no folder for it.
         OSError: nothing can be written there.
     """
@@ -68,7 +64,7 @@ def claim(path: Path, patience: float = _PATIENCE) -> Iterator[Path]:
             if lock is not None:
                 break
             if time.monotonic() > deadline:
-                raise BusyError(f"{path}: another process is writing it")
+                raise InputError(f"{path}: another process is writing it")
             time.sleep(_PAUSE)
         inside = folder / _INSIDE
         shutil.rmtree(inside, ignore_errors=True)
@@ -89,7 +85,7 @@ def hold(path: Path, patience: float = _PATIENCE) -> Iterator[Path]:
         patience: how long to wait for another writer to be done [s].
 
     Raises:
-        BusyError: another process holds the output.
+        InputError: another process holds the output.
         OSError: nothing can be written there.
     """
     sweep(path.parent)

@@ -21,6 +21,7 @@ from pianomime.players.receding_horizon import (
 )
 from pianomime.track.keystroke import KeystrokeController, KeystrokeTracker
 from pianomime.world import World
+from pianomime.world.parameters import key_centres
 
 SHORT = HorizonConfig(first=1.0, longest=2.0, ahead=2.0)
 
@@ -69,9 +70,9 @@ def test_the_hands_move_on_from_where_they_are(monkeypatch: pytest.MonkeyPatch) 
     begun: list[Any] = []
     start = KeystrokeTracker.start
 
-    def noting(self: KeystrokeTracker, plan: Any, before: Any = None) -> KeystrokeController:
-        made = start(self, plan, before)
-        begun.append((before, made))
+    def noting(self: KeystrokeTracker, plan: Any, given: Any = None) -> KeystrokeController:
+        made = start(self, plan, given)
+        begun.append((given and given.poses, made))
         return made
 
     monkeypatch.setattr(KeystrokeTracker, "start", noting)
@@ -88,26 +89,54 @@ def test_the_hands_move_on_from_where_they_are(monkeypatch: pytest.MonkeyPatch) 
             assert at_the_seam <= inside
 
 
+@pytest.mark.parametrize("edge", range(9, 26, 2))
+def test_strikes_at_the_end_of_a_stretch_are_where_the_whole_plan_has_them(edge: int) -> None:
+    """Also where a finger strikes another key just as it has let one go."""
+    random = np.random.default_rng(edge)
+    onset = np.arange(24) * 0.1
+    score = Score(random.integers(40, 64, 24), onset, onset + 0.1, np.full(24, 80))
+    ours = player(HorizonConfig(first=edge / 20, longest=edge / 20, ahead=2.0))
+    controller, world = ours.start(score), World()
+    at_once = whole(ours).start(score)
+    assert isinstance(at_once, KeystrokeController)
+    for number in range(score.frames() * 5):
+        controller.control(number, world)
+    assert np.abs(controller._x - at_once.x).max() < 0.003
+
+
+def test_pedal_and_world_are_those_of_the_score_and_player() -> None:
+    score = song(3.0)
+    score = replace(score, pedal=np.array([[0.4, 2.2]]))
+    ours = load_player("zero-shot", effort=0, world="solid", horizon={"first": 1.0})
+    played = ours.play(score)
+    assert played.world == "solid"
+    np.testing.assert_array_equal(played.pedal_times, score.pedal)
+    assert len(played.event_key) >= len(score) - 1
+
+
 def test_a_held_key_is_held_through_the_end_of_a_stretch() -> None:
-    score = Score([40, 44], [0.6, 0.6], [3.6, 3.6], [80, 80])
+    score = Score([40, 44], [0.6, 0.6], [6.6, 6.6], [80, 80])
     played = player(SHORT).play(score)
     assert sorted(played.event_key.tolist()) == [40, 44]
-    assert (played.event_off > 3.5).all()
+    assert (played.event_off > 6.5).all()
 
 
 def test_a_leap_after_a_stretch_is_prepared_before_it() -> None:
     """What lies ahead counts: without it the hand would begin to move when it should be there."""
     # The left hand is busy in the bass, so the right one leaps.
-    key, onset, offset = [5, 50, 87], [0.6, 0.6, 2.23], [3.0, 1.2, 2.6]
+    key, onset, offset = [5, 50, 87], [0.6, 0.6, 2.36], [3.0, 1.2, 2.8]
     score = Score(key, onset, offset, [80, 80, 80])
     horizon = replace(SHORT, first=2.0)
     looks, blind = (
         player(replace(horizon, ahead=ahead)).play(score) for ahead in (horizon.ahead, 0.0)
     )
-    late = [played.event_on[played.event_key == 87] - onset[2] for played in (looks, blind)]
-    assert len(late[0]) == 1
-    assert abs(late[0][0]) < 0.05
-    assert len(late[1]) != 1 or abs(late[1][0]) > 0.1
+    assert sorted(looks.event_key.tolist()) == [5, 50, 87]
+    away = [
+        abs(float(np.mean(played.plan.fingertips[39, 1, 1:, 1])) - key_centres()[87, 1])
+        for played in (looks, blind)
+        if played.plan is not None
+    ]
+    assert away[0] < 0.6 * away[1]
 
 
 def test_the_plan_grows_while_it_is_played() -> None:

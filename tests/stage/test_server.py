@@ -292,6 +292,7 @@ def test_the_sound_that_is_asked_for_at_the_end_is_the_whole_one(stage: Stage) -
     """Law: also in the moment in which the replay says that it is done."""
     client = Client(stage)
     job = client.play()
+    client.open("GET", f"jobs/{job}/replay").read()
     whole = client.open("GET", f"jobs/{job}/sound?whole")
     assert whole.headers["Content-Length"] is not None
     assert whole.read() == client.open("GET", f"jobs/{job}/sound").read()
@@ -310,6 +311,7 @@ def test_the_sound_that_is_asked_for_at_the_end_is_the_whole_one(stage: Stage) -
         ("bytes=99999999-", 200, (0, None)),
         ("lines=1-2", 200, (0, None)),
         ("bytes=-99999999", 200, (0, None)),
+        ("bytes=" + "9" * 5000 + "-", 200, (0, None)),
     ],
 )
 def test_parts_of_a_file(
@@ -333,17 +335,52 @@ def test_parts_of_a_file(
 def test_the_page_of_a_long_report_reads_its_parts_from_a_sandbox(stage: Stage) -> None:
     client = Client(stage)
     job = client.play()
+    client.open("GET", f"jobs/{job}/replay").read()
     page = client.open("GET", f"jobs/{job}/files/report.html")
     policy = page.headers["Content-Security-Policy"]
     page.read()
     assert "sandbox allow-scripts allow-downloads" in policy
     assert "allow-same-origin" not in policy
     part = client.open("GET", f"jobs/{job}/files/performance.mp3", Origin="null")
-    assert part.status in (200, 404)
+    assert part.status == 200
     assert part.headers["Access-Control-Allow-Origin"] == "null"
+    # Sound is asked for without an origin.
+    assert part.headers["Cross-Origin-Resource-Policy"] == "cross-origin"
+    assert client.open("GET", "library").headers["Cross-Origin-Resource-Policy"] == "same-origin"
     for path in ("library", f"jobs/{job}/replay"):
         assert client.refused("GET", path, Origin="null")[0] == 403
     assert client.refused("POST", "jobs", b"{}", Origin="null")[0] == 403
+
+
+def test_two_songs_of_one_title_are_kept_apart(stage: Stage, tmp_path: Path) -> None:
+    """Also where they come to their ends together, as two that are compared."""
+    clients = [Client(stage, "one"), Client(stage, "two")]
+    jobs = [client.play(seconds=1.0) for client in clients]
+    replays = [
+        client.open("GET", f"jobs/{job}/replay") for client, job in zip(clients, jobs, strict=True)
+    ]
+    for replay in replays:
+        assert blocks(replay.read())[-1][0] == "DONE"
+    kept = sorted(path.name for path in (tmp_path / "out").glob("beethoven*"))
+    assert kept == ["beethoven-ode-to-joy", "beethoven-ode-to-joy-2"]
+
+
+def test_no_command_line_has_the_secret(
+    stage: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    left = tmp_path / "out" / ".pianomime-open-of-one-that-was-killed.html"
+    left.touch()
+    with Stage(tmp_path / "out", []) as other:
+        other.open_browser()
+        (address,) = opened
+        assert other.url not in address
+        door = Path(address.removeprefix("file://"))
+        assert other.url in door.read_text(encoding="utf-8")
+        assert door.stat().st_mode & 0o077 == 0
+        assert not left.exists()
+    assert not door.exists()
 
 
 def test_songs_beside_performances_are_listed(tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 /** Where the bytes of a replay come from. */
 
 const NOT_FROM_DISK =
-  "A page opened from a disk may not read the replay beside it. Serve its folder (`python -m " +
-  "http.server`, then open the address that it prints), or open the folder with `pianomime stage FOLDER`.";
+  "A page opened from a disk may not read the replay beside it. Run `python -m http.server --bind " +
+  "127.0.0.1` in its folder, and open the address that it prints.";
 
 /** Bytes from an address, as they arrive. */
 export async function fromAddress(

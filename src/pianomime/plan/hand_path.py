@@ -73,8 +73,9 @@ class HandPaths:
             fingers stay near, world frame [m]; None for no such preference.
 
     Attributes:
-        fingertips: (T, 2, 6, 3) points, world frame [m]; z is 0 for fingers that press. Hands are
-            at rest in frames that are not planned yet.
+        fingertips: (T, 2, 6, 3) points, world frame [m]; z is 0 for fingers that press. It is
+            written into: after the frames that are planned come those that were looked ahead at,
+            whose points are not final, and then hands at rest.
         planned: number of frames that are.
     """
 

@@ -71,7 +71,7 @@ class Strikes:
         """Number of strikes."""
         return len(self.key)
 
-    def some(self, which: NDArray[np.int64], since: float) -> Strikes:
+    def some_since(self, which: NDArray[np.int64], since: float) -> Strikes:
         """Some of the strikes, timed from a later moment.
 
         Args:

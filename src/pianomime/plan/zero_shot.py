@@ -60,7 +60,7 @@ class GrowingPlan:
 
     @property
     def plan(self) -> FingertipPlan:
-        """The plan; hands are at rest in frames that are not planned yet."""
+        """The plan so far; its `fingertips` are written into, see `HandPaths.fingertips`."""
         return FingertipPlan(
             self._paths.fingertips,
             self._finger_key,

@@ -1,11 +1,12 @@
-"""The receding-horizon player: it plans some seconds, plays them, and plans on from where it is.
+"""The receding-horizon player: it plans some seconds, plays them, and plans on from there.
 
-It begins to play as soon as the first seconds are planned, however long the piece is. Fingering
-alone is found for the whole piece before it begins.
+It begins to play as soon as the first seconds are planned. The fingering alone is found for the
+whole piece before it begins, which takes some 5 ms a note.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from pianomime.plan.strikes import Strikes
 from pianomime.plan.zero_shot import GrowingPlan
 from pianomime.players.player import PlannedPlayer
 from pianomime.track import KeystrokeTracker
-from pianomime.track.keystroke import KeystrokeController
+from pianomime.track.keystroke import Continuation, KeystrokeController
 from pianomime.validation import above_zero, finite, within
 from pianomime.world import World
 
@@ -32,7 +33,7 @@ class HorizonConfig:
     longest: float = 32.0
     """Longest stretch [s]."""
     ahead: float = 3.0
-    """Music after each stretch that its plan takes into account [s]."""
+    """Music after each stretch that its plan takes into account [s]; at least a stroke is."""
 
     def __post_init__(self) -> None:
         finite(self)
@@ -79,13 +80,13 @@ class RecedingHorizonController:
         self._growing, self._tracker, self._config = growing, tracker, config
         self._frames = len(growing.plan)
         self._length = config.first
-        self._x = np.empty(len(_strikes(growing.plan)))
-        self._first = 0
+        self._x = np.full(len(_strikes(growing.plan)), np.nan)
+        self._begin = 0
         self._stretch = self._follow(None)
 
     @property
     def plan(self) -> FingertipPlan:
-        """What is followed; hands are at rest in frames that are not planned yet."""
+        """What is followed, see `GrowingPlan.plan`."""
         return self._growing.plan
 
     @property
@@ -96,37 +97,36 @@ class RecedingHorizonController:
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) as `KeystrokeController.control`; the next stretch is planned when it begins."""
         if frame >= self._growing.planned * self.controls_per_frame:
-            before = self._stretch.poses_before(self._growing.planned - self._first)
-            self._first = self._growing.planned
-            self._stretch = self._follow(before)
-        return self._stretch.control(frame - self._first * self.controls_per_frame, world)
+            poses = self._stretch.poses_before(self._growing.planned - self._begin)
+            self._begin = self._growing.planned
+            self._stretch = self._follow(poses)
+        return self._stretch.control(frame - self._begin * self.controls_per_frame, world)
 
-    def _follow(self, before: list[NDArray[np.float64]] | None) -> KeystrokeController:
+    def _follow(self, poses: list[NDArray[np.float64]] | None) -> KeystrokeController:
         """Plan a stretch; what controls it, and what comes just after it."""
-        ahead = round(self._config.ahead * FRAME_RATE)
-        stop = min(self._first + max(1, round(self._length * FRAME_RATE)), self._frames)
+        stroke = self._tracker.config.stroke
+        takes = stroke.longest + stroke.settle
+        # Strokes that begin in the stretch are planned to their end.
+        ahead = math.ceil(max(self._config.ahead, takes) * FRAME_RATE)
+        stop = min(self._begin + max(1, round(self._length * FRAME_RATE)), self._frames)
         self._length = min(2 * self._length, self._config.longest)
         self._growing.extend(stop, ahead)
-        plan, here = self._growing.plan, slice(self._first, stop + ahead)
-        began, ends = self._first * FRAME_SECONDS, (stop + ahead) * FRAME_SECONDS
-        strikes, stroke = _strikes(plan), self._tracker.config.stroke
-        takes = stroke.longest + stroke.settle
+        plan, here = self._growing.plan, slice(self._begin, stop + ahead)
+        began, ends = self._begin * FRAME_SECONDS, (stop + ahead) * FRAME_SECONDS
+        strikes = _strikes(plan)
         chosen = np.flatnonzero(
             (strikes.release + stroke.rise > began) & (strikes.onset - takes < ends)
         )
-        fingertips = plan.fingertips[here]
-        held = chosen[strikes.onset[chosen] < began]
-        if len(held):
-            # A finger that is on its key stays where it struck it.
-            fingertips = fingertips.copy()
-            fingertips[0, strikes.hand[held], 1 + strikes.finger[held], 0] = self._x[held]
         stretch = replace(
             plan,
-            fingertips=fingertips,
+            fingertips=plan.fingertips[here],
             finger_key=plan.finger_key[here],
-            strikes=strikes.some(chosen, since=began),
+            strikes=strikes.some_since(chosen, began),
         )
-        controller = self._tracker.start(stretch, before)
+        # A finger that is on its key stays where it struck it.
+        held = strikes.onset[chosen] < began
+        begun = poses and Continuation(poses, np.where(held, self._x[chosen], np.nan))
+        controller = self._tracker.start(stretch, begun or None)
         self._x[chosen] = controller.x
         return controller
 

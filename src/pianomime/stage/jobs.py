@@ -150,17 +150,18 @@ class Jobs:
         Raises:
             OSError: there is no room for its files.
         """
+        number = secrets.token_hex(8)
+        folder = self._folder / number
+        folder.mkdir()
         mine = [job for job in self._jobs.values() if job.page == page]
         for job in mine:
             job.stop()
         ended = [job for job in self._jobs.values() if job.done]
-        # What a page showed before, it shows no longer.
-        for job in {*ended[:-_MOST_DONE], *(job for job in mine if job.done)}:
+        # Of what a seat showed before, its last report may be open beside it.
+        gone = {*ended[:-_MOST_DONE], *[job for job in mine if job.done][:-1]}
+        for job in gone:
             del self._jobs[job.number]
             shutil.rmtree(job.folder, ignore_errors=True)
-        number = secrets.token_hex(8)
-        folder = self._folder / number
-        folder.mkdir()
         job = Job(number, page, folder, request, self._waiting)
         self._waiting = self._worker()
         self._jobs[number] = job

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import threading
@@ -19,7 +20,7 @@ from pianomime.files import atomic
 from pianomime.music import Score
 from pianomime.players.performance import Performance, is_performance
 from pianomime.shown import shown
-from pianomime.songs.find import MIDI_SUFFIXES, find_songs
+from pianomime.songs.find import find_songs
 
 _UPLOADS = "songs"
 """Folder of files that were dropped, in that of the stage."""
@@ -150,16 +151,17 @@ class Library:
         elif path.is_dir():
             performances = [file for file in sorted(path.rglob("*.npz")) if is_performance(file)]
             self._performances += performances
-            # MIDI files beside a performance are its own.
-            results = {file.parent for file in performances}
+            found = []
             if performances:
-                self._songs += [
-                    song
-                    for song in sorted(path.rglob("*"))
-                    if song.suffix.lower() in MIDI_SUFFIXES and song.parent not in results
-                ]
+                # In results there need be no songs, and there is sound.
+                with warnings.catch_warnings(), contextlib.suppress(InputError):
+                    warnings.simplefilter("ignore")
+                    found = find_songs([path])
             else:
-                self._songs += find_songs([path])
+                found = find_songs([path])
+            # What a performance sounded like is no other song.
+            played = {file.with_suffix(".mid") for file in performances}
+            self._songs += [song for song in found if song not in played]
         else:
             self._songs += find_songs([path])
 

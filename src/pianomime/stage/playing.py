@@ -26,13 +26,17 @@ from pianomime.replay.blocks import json_block
 from pianomime.report import FILES, write_report
 from pianomime.report.mp3 import Mp3
 from pianomime.stage.live import LiveReplay
-from pianomime.staging import BusyError
+from pianomime.staging import claim
 from pianomime.workers import Answer, Row
 
 WORKER = "pianomime.stage.playing:load"
 
 REPLAY, SOUND = "live.replay", "live.mp3"
 """Files in the folder of a job that grow while it goes on."""
+_NAMING = "naming"
+"""Stands for all reports of a stage, of which one is written at a time."""
+_PATIENCE = 600.0
+"""[s] for other reports to be written."""
 REPORT = "report"
 """Folder in that of a job for the report of a performance that was saved before."""
 
@@ -104,18 +108,15 @@ def _report(performance: Performance, folder: Path) -> Row:
 
 def _report_in_new_folder(performance: Performance, out: Path, name: str) -> tuple[Path, Row]:
     """Write a report into a folder of a name that is not taken; the folder and its row."""
-    for number in count(1):
-        folder = out / (name if number == 1 else f"{name}-{number}")
-        if not folder.exists():
-            try:
-                return folder, _report(performance, folder)
-            except BusyError:  # Another song of this name comes to its end.
-                continue
-    raise AssertionError("there are always more numbers")
+    # Two of one name may come to their ends together: the other looks for a name afterwards.
+    with claim(out / _NAMING, patience=_PATIENCE):
+        numbers = (out / (name if number == 1 else f"{name}-{number}") for number in count(1))
+        folder = next(folder for folder in numbers if not folder.exists())
+        return folder, _report(performance, folder)
 
 
 class WholeParts(io.FileIO):
-    """A file that has each of what is written at once, and whole or not at all."""
+    """A file that has each of what is written at once, and in the end whole or not at all."""
 
     def write(self, part: Any, /) -> int:
         """Write it; where there is no room for it, as on a full disk, nothing."""

@@ -44,7 +44,7 @@ _PARTS = {
     "performance.replay.gz": "application/octet-stream",
 }
 """Files that the page of a long report reads because it does not hold them; their media types."""
-_SPAN = re.compile(r"bytes=([0-9]*)-([0-9]*)")
+_SPAN = re.compile(r"bytes=([0-9]{0,15})-([0-9]{0,15})")
 _BODY = '<script type="module" src="stage.js"></script>\n'
 _EFFORTS = range(4)
 _NO_PLAYERS_OF_SONGS = ("demonstration", "demonstration-ik", "expert")
@@ -218,7 +218,8 @@ class _Files(_Handler):
         if name in _PARTS:
             await self.send_part(job, name)
             return
-        await job.ended.wait()
+        if name in _KINDS:
+            await job.ended.wait()
         if name not in _KINDS or job.report is None or not (job.report / name).is_file():
             self.refuse(404, "It is not there.")
             return

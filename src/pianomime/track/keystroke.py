@@ -21,6 +21,7 @@ from pianomime.plan.joint_path import KEY_REST, PathConfig, PathProblem, resting
 from pianomime.plan.keep_apart import smooth_paths
 from pianomime.plan.strikes import Strikes
 from pianomime.progress import Steps, ignore
+from pianomime.short_repr import short_repr
 from pianomime.track.dynamic import motion_torque, to_actuators
 from pianomime.track.finger_feedback import lift_joints, reach_joints, shared
 from pianomime.track.strokes import Corrections, StrokeConfig, strokes_of
@@ -77,6 +78,23 @@ class KeystrokeConfig:
             raise InputError(f"controls must divide {SUBSTEPS}, not be {self.controls}")
 
 
+@dataclass(frozen=True, eq=False)
+class Continuation:
+    """What a controller that begins in the middle of a piece goes on from.
+
+    Attributes:
+        poses: (left, right) (S + 1, 27) joint positions at the ends of the S controls of the frame
+            before the first, the last of them at its end [rad, m].
+        x: (M,) world x at which each strike of the plan is struck [m]; NaN for those that the plan
+            itself has, because they have not begun.
+    """
+
+    poses: list[NDArray[np.float64]]
+    x: NDArray[np.float64]
+
+    __repr__ = short_repr
+
+
 class KeystrokeTracker:
     """Follows plans that have strikes.
 
@@ -89,22 +107,19 @@ class KeystrokeTracker:
         self.config = config or KeystrokeConfig()
         self._hands = [Hand(side, world) for side in SIDES]
 
-    def start(
-        self, plan: FingertipPlan, before: list[NDArray[np.float64]] | None = None
-    ) -> KeystrokeController:
+    def start(self, plan: FingertipPlan, begun: Continuation | None = None) -> KeystrokeController:
         """A controller with paths and the feed-forward controls that follow them.
 
         Args:
             plan: what to follow.
-            before: where the hands come from, see `KeystrokeController.poses_before`; None from
-                rest.
+            begun: what it goes on from; None from rest, with no key struck.
 
         Raises:
             InputError: the plan has no strikes.
         """
         if plan.strikes is None:
             raise InputError("this plan has no strikes: it says nothing of notes between frames")
-        return KeystrokeController(plan, plan.strikes, self.config, self._hands, before)
+        return KeystrokeController(plan, plan.strikes, self.config, self._hands, begun)
 
 
 class KeystrokeController:
@@ -123,8 +138,7 @@ class KeystrokeController:
         strikes: of the plan.
         config: settings.
         hands: (left, right), for kinematics; their pose is not preserved.
-        before: (left, right) (S + 1, 27) joint positions at the ends of the S controls of the frame
-            before the first, the last of them at its end [rad, m]; None where hands are at rest.
+        begun: what it goes on from; None from rest, with no key struck.
     """
 
     replayable = True
@@ -135,19 +149,21 @@ class KeystrokeController:
         strikes: Strikes,
         config: KeystrokeConfig,
         hands: list[Hand],
-        before: list[NDArray[np.float64]] | None = None,
+        begun: Continuation | None = None,
     ) -> None:
         self.plan, self.strikes, self.config = plan, strikes, config
         self.speeds = config.stroke.speeds(strikes)
         self._hands = hands
         rest = np.zeros((config.controls + 1, LAYOUT.hand_joints))
-        self._before = before or [rest] * len(hands)
+        self._before = begun.poses if begun else [rest] * len(hands)
         ends = np.arange(1, len(plan) * config.controls + 1, dtype=np.float64)
         self._times = ends * self._dt
         self._gain = np.full(LAYOUT.hand_joints, config.joint_feedback)
         self._gain[LAYOUT.slides] = config.slide_feedback
         frame = np.floor(strikes.onset / FRAME_SECONDS).astype(int).clip(0, len(plan) - 1)
         self.x = plan.fingertips[frame, strikes.hand, 1 + strikes.finger, 0]
+        if begun:
+            self.x = np.where(np.isnan(begun.x), self.x, begun.x)
         hinge = key_centres()[strikes.key, 0] - key_half_sizes()[strikes.key, 0]
         self._reach = self.x - hinge
         # The last is of fingers that strike nothing, whose strike is -1.
@@ -174,7 +190,7 @@ class KeystrokeController:
         return self._steps(self.config.again)
 
     def poses_before(self, frame: int) -> list[NDArray[np.float64]]:
-        """Where the hands come from when a frame after the first begins, as for `before`."""
+        """Where the hands should come from when a later frame begins, see `Continuation`."""
         stop = frame * self.config.controls + 1
         return [path[stop - self.config.controls - 1 : stop] for path in self._paths]
 

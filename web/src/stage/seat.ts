@@ -19,6 +19,8 @@ export class Seat {
   private readonly remarks = make("p", { class: "remarks", hidden: "" });
   private readonly downloads = make("p", { class: "downloads", hidden: "" });
   private job: string | null = null;
+  /** Counts what was asked for, of which only the last is shown. */
+  private asked = 0;
 
   /**
    * @param number of the seat in the page.
@@ -44,7 +46,13 @@ export class Seat {
   async show(asked: Parameters<typeof api.start>[1]): Promise<void> {
     this.notice.tell(null);
     this.downloads.hidden = true;
+    const mine = ++this.asked;
     const job = await api.start(this.number, asked);
+    if (mine !== this.asked) {
+      // Something else was asked for meanwhile, or nothing any more.
+      await api.stop(job);
+      return;
+    }
     this.job = job;
     this.replay.currentTime = 0;
     // Of a saved performance the sound is there in the end.
@@ -60,6 +68,7 @@ export class Seat {
 
   /** Show nothing, and end what is being played for it. */
   async clear(): Promise<void> {
+    this.asked++;
     // Whether there is anything to stop, the replay says as long as it is there.
     const stopped = this.stop();
     const { replay } = this;
