@@ -4,7 +4,7 @@ Performances are played again and watched at every physics step. Of a group of j
 widest range of one joint, and the greatest and the 99th percentile of speeds and efforts over all
 joints and steps. Efforts are those of the actuators; an acceleration is a change of speed from one
 step to the next, over its time. `some_joint_over_hand_speed` is the share of steps in which a joint
-of wrists or fingers is faster than `limits.HAND_SPEED`.
+of wrists or fingers is faster than Shadow Robot allows it to be (`limits.hand_speeds`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import common
 from pianomime.export.joints import Joints, effort_unit
-from pianomime.export.limits import HAND_SPEED
+from pianomime.export.limits import hand_speeds
 from pianomime.export.samples import PHYSICS_RATE, Samples, samples
 from pianomime.players.performance import Performance
 from pianomime.world.model import world_model
@@ -75,10 +75,10 @@ def main() -> None:
     rows = {label: needed(joints, pattern, played) for label, pattern in GROUPS.items()}
     rails = columns(joints, "forearm_t[xyz]")
     change = max(np.abs(np.diff(each.velocity[:, rails], axis=0)).max() for each in played)
-    hinges = columns(joints, "(?!forearm).*")
+    hinges, speeds = columns(joints, "(?!forearm).*"), hand_speeds(joints)
     too_fast = {
         f"{path.parent.name}/{path.stem}": float(
-            (np.abs(each.velocity[:, hinges]) > HAND_SPEED).any(axis=1).mean()
+            (np.abs(each.velocity[:, hinges]) > speeds[hinges]).any(axis=1).mean()
         )
         for path, each in zip(arguments.performances, played, strict=True)
     }

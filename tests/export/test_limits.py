@@ -56,8 +56,16 @@ def test_limits_are_those_of_the_model(limits: Limits) -> None:
         assert limits.joints.mover[joint[name]] == actuator["lh_RFJ0"]
         assert joint[name] in limits.joints.coupled[actuator["lh_RFJ0"]]
     assert len(limits.joints.coupled) == 8
-    hand = [index for name, index in joint.items() if "forearm" not in name]
-    assert (limits.velocity[hand] == 2.0).all()
+
+
+def test_speeds_are_those_of_shadows_description(limits: Limits) -> None:
+    """Velocity limits of its URDF: 4 rad/s for THJ5 and THJ4, 2 rad/s for all others."""
+    speeds = dict(zip(limits.joints.names, limits.velocity, strict=True))
+    hand = {name for name in speeds if "forearm" not in name}
+    faster = {f"{side}_{joint}" for side in ("rh", "lh") for joint in ("THJ5", "THJ4")}
+    assert len(hand) == 2 * 24
+    assert {speeds[name] for name in faster} == {4.0}
+    assert {speeds[name] for name in hand - faster} == {2.0}
 
 
 def test_rails_are_as_fast_as_their_motors() -> None:

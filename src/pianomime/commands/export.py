@@ -45,7 +45,8 @@ class Export:
         None
     )
     """Limits of your robot: a limits.csv of an export, in which you changed numbers. By default the
-    limits of the world, and the speed that Shadow Robot gives for its hand, 2 rad/s."""
+    limits of the world, and the speeds that Shadow Robot gives for its hand: 4 rad/s at the thumb's
+    base, 2 rad/s elsewhere."""
     strict: bool = False
     """Write nothing if a limit is broken."""
 

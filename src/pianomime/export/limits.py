@@ -16,9 +16,12 @@ from pianomime.players.motion import FrameMotion
 from pianomime.short_repr import short_repr
 from pianomime.world.parameters import SUBSTEPS
 
-HAND_SPEED = 2.0
-"""[rad/s] Limit of every joint in Shadow Robot's own description of the hand (the URDF of its
-package `sr_description`, attribute `velocity`). The model of the world has no such limit."""
+_HAND_SPEED = 2.0
+"""[rad/s] Limit of wrists and fingers in Shadow Robot's own description of the hand (the URDF of
+its package `sr_description`, attribute `velocity`), but for those of `_FASTER`. The model of the
+world has no such limit."""
+_FASTER = {"THJ5": 4.0, "THJ4": 4.0}
+"""[rad/s] That of the joints at the thumb's base, by their names without the side."""
 _SLACK = 1e-3
 """[rad, m] A position beyond its limit by no more is at it: limits in the simulation are soft."""
 _ROUNDING = 1e-9
@@ -56,7 +59,7 @@ class Limits:
     Attributes:
         joints: their names and units.
         lower, upper: (54,) of the joints' positions [rad, m].
-        velocity: (54,) greatest speed of each joint [rad/s, m/s]: of the hand's `HAND_SPEED`; of
+        velocity: (54,) greatest speed of each joint [rad/s, m/s]: of the hand's `hand_speeds`; of
             the forearms' slides the speed at which the model's motor has no force left.
         effort: (46,) greatest torque or force of each actuator [N m, N].
         low, high: (46,) of the actuators' targets [rad, m].
@@ -91,11 +94,21 @@ class Limits:
             joints=joints,
             lower=lower.copy(),
             upper=upper.copy(),
-            velocity=np.where(slide, no_load, HAND_SPEED),
+            velocity=np.where(slide, no_load, hand_speeds(joints)),
             effort=effort,
             low=low.copy(),
             high=high.copy(),
         )
+
+
+def hand_speeds(joints: Joints) -> NDArray[np.float64]:
+    """(54,) Speeds that Shadow Robot allows each joint of its hand [rad/s]; inf for slides.
+
+    Args:
+        joints: their names and units.
+    """
+    speeds = [_FASTER.get(name.partition("_")[2], _HAND_SPEED) for name in joints.names]
+    return np.where(np.array(joints.units) == "m", np.inf, speeds)
 
 
 class LimitCheck:
