@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pianomime.errors import InputError
+from pianomime.keyboard import KEYS
 from pianomime.track.calibration import hand_along, keys_aside
 from pianomime.track.nominal_tracking import (
     NominalTrackingConfig,
@@ -76,6 +79,47 @@ def test_a_reference_is_what_the_nominal_world_does(ctrl: np.ndarray, reference:
         world.step(row)
     np.testing.assert_array_equal(reference.path[-1], world.qpos_hands)
     np.testing.assert_array_equal(reference.ctrl[3], ctrl[0, 1])
+
+
+@pytest.mark.parametrize("controls", [1, 5])
+def test_where_the_physics_broke_the_path_is_that_of_the_hands(
+    ctrl: np.ndarray, controls: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """MuJoCo's reset, to poses that are all zero, is not where the hands were."""
+    wanted = ctrl[:8, :controls]
+    broken_frame = 5
+    hold, held = World._hold, itertools.count()
+
+    def breaks(world: World, *rest: Any) -> None:
+        if next(held) == broken_frame * controls:
+            world.data.qvel[KEYS + 2] = 1e12
+        hold(world, *rest)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(World, "_hold", breaks)
+        reference = Reference.of(wanted)
+        held, world, ends = itertools.count(), World(quiet=True), []
+        for row in wanted.reshape(-1, LAYOUT.ctrl_size):
+            world.step(row, parts=controls)
+            ends.append(world.qpos_hands)
+    assert world.blow_ups == 1
+    each = SUBSTEPS // controls
+    np.testing.assert_array_equal(reference.path[each::each], ends)
+    first = broken_frame * SUBSTEPS
+    recovered = reference.path[first + 1 : first + each + 1]
+    np.testing.assert_array_equal(recovered, np.tile(ends[broken_frame * controls], (each, 1)))
+    assert np.count_nonzero(recovered[0]) == 2
+    along = [joints.start + LAYOUT.slide - KEYS for joints in LAYOUT.joints]
+    np.testing.assert_array_equal(recovered[0, along], reference.path[first, along])
+
+
+def test_a_reference_needs_frames_and_a_path_of_them(reference: Reference) -> None:
+    with pytest.raises(ValueError, match="at least one frame"):
+        Reference.of(np.zeros((0, 5, LAYOUT.ctrl_size)))
+    with pytest.raises(ValueError, match="ctrl must be"):
+        Reference.of(np.zeros((10, LAYOUT.ctrl_size)))
+    with pytest.raises(ValueError, match="not 3"):
+        Reference(reference.ctrl, reference.path[:3])
 
 
 def test_nothing_is_added_in_the_nominal_world(reference: Reference) -> None:

@@ -52,7 +52,7 @@ class NominalTrackingConfig:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the hands do in the nominal world, in N physics steps of 5 ms.
+    """What the hands do in the nominal world, in N > 0 physics steps of 5 ms.
 
     Attributes:
         ctrl: (N, 46) controls, right then left hand [rad, m].
@@ -64,22 +64,53 @@ class Reference:
 
     __repr__ = short_repr
 
+    def __post_init__(self) -> None:
+        """Check it.
+
+        Raises:
+            ValueError: there is no physics step, or `path` does not belong to `ctrl`.
+        """
+        if not len(self.ctrl):
+            raise ValueError("a reference needs at least one frame")
+        if len(self.path) != len(self.ctrl) + 1:
+            raise ValueError(
+                f"a path of {len(self.ctrl)} steps has {len(self.ctrl) + 1} rows, not "
+                f"{len(self.path)}"
+            )
+
     @classmethod
     def of(cls, ctrl: NDArray[np.float64], world: str = PAPER) -> Reference:
         """Play controls from the rest pose.
+
+        Where the physics breaks, the path goes on at once in the pose into which the world puts
+        the hands, not in that of MuJoCo's reset, in which they never were.
 
         Args:
             ctrl: (T, S, 46), S in each of T frames.
             world: name of the nominal world.
 
         Raises:
-            ValueError: `ctrl` has another shape or is not finite.
+            InputError: there is no such world.
+            ValueError: `ctrl` has another shape or no frames, or is not finite.
         """
-        nominal = World(world, quiet=True)
+        if ctrl.ndim != 3 or not ctrl.shape[1]:
+            raise ValueError(f"ctrl must be (T, S, {LAYOUT.ctrl_size}), not {ctrl.shape}")
+        nominal, parts = World(world, quiet=True), ctrl.shape[1]
         path = [nominal.qpos_hands]
-        for frame in ctrl:
-            nominal.step(frame, watch=lambda: path.append(nominal.qpos_hands))
-        every_step = np.repeat(ctrl, SUBSTEPS // ctrl.shape[1], axis=1)
+        lost: list[int] = []
+
+        def watch() -> None:
+            if nominal.broken:
+                lost.append(len(path))
+            path.append(nominal.qpos_hands)
+
+        # Control by control: the hands are put back at the end of each one that broke.
+        for target in ctrl.reshape(-1, ctrl.shape[2]):
+            nominal.step(target, watch=watch, parts=parts)
+            for step in lost:
+                path[step] = nominal.qpos_hands
+            lost.clear()
+        every_step = np.repeat(ctrl, SUBSTEPS // parts, axis=1)
         return cls(every_step.reshape(-1, LAYOUT.ctrl_size), np.array(path))
 
 

@@ -96,7 +96,9 @@ class World(WorldState):
                 MuJoCo clamps them to their ranges. Or (S, 46) to be sent one after the other, each
                 for as long.
             pedal: whether the sustain pedal is down.
-            watch: called after each physics step, of which a frame has 10, to read `data`.
+            watch: called after each physics step, of which a frame has 10, to read `data`. From
+                the step in which the physics breaks to the end of the control that is held,
+                `broken` is true, and what it reads is of no world that was.
             parts: of how many equal parts of a frame one is simulated; S times `parts` divides 10.
                 Parts with one control each are, bit for bit, the frame with all of them.
 
@@ -130,7 +132,7 @@ class World(WorldState):
             moved[:, substep + 1, 0] = qpos[:KEYS], qvel[:KEYS]
             if watch is not None:
                 watch()
-        if self._broken():
+        if self.broken:
             self.blow_ups += 1
             if not self.quiet:
                 warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=3)
@@ -189,6 +191,14 @@ class World(WorldState):
         return name_of(self.model)
 
     @property
+    def broken(self) -> bool:
+        """Whether the physics broke while a control is held; after a step it is recovered."""
+        return bool(
+            any(self.data.warning[kind].number for kind in RESETS)
+            or not np.isfinite(self.data.qpos).all()
+        )
+
+    @property
     def fingertips(self) -> NDArray[np.float64]:
         """(2, 6, 3) World positions [m]; hands (left, right), points wrist, thumb .. little."""
         mujoco.mj_kinematics(self.model, self.data)
@@ -212,9 +222,3 @@ class World(WorldState):
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:] = qpos
         mujoco.mj_forward(self.model, self.data)
-
-    def _broken(self) -> bool:
-        return bool(
-            any(self.data.warning[kind].number for kind in RESETS)
-            or not np.isfinite(self.data.qpos).all()
-        )
