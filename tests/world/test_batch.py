@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -144,6 +146,59 @@ def test_broken_physics_in_one_world_is_its_own(controls: NDArray[np.float64]) -
                 world.step(mine)
         assert_same(batch, worlds)
     np.testing.assert_array_equal(batch.blow_ups, [0, 1, 0])
+
+
+@pytest.mark.parametrize("restored", [False, True])
+def test_worlds_that_are_not_reset_keep_what_they_heard(
+    restored: bool, controls: NDArray[np.float64]
+) -> None:
+    batch = WorldBatch(WORLDS, 1)
+    for ctrl in controls:
+        batch.step(ctrl)
+        heard = batch.key_events
+        if len(set(heard.world)) == WORLDS:
+            break
+    assert len(set(heard.world)) == WORLDS
+    if restored:
+        batch.set_state(batch.state()[[0, 2]], ids=[0, 2])
+    else:
+        batch.reset(ids=[0, 2])
+    for before, after in zip(heard, batch.key_events, strict=True):
+        np.testing.assert_array_equal(after, before[heard.world == 1])
+    batch.reset()
+    assert len(batch.key_events.key) == 0
+
+
+@pytest.mark.parametrize(
+    "ids",
+    [[True, False, True], [2, 0], [1, 1], [-1], [3], [0.0, 1.0], [[0, 1]], 1],
+    ids=["mask", "falling", "twice", "negative", "beyond", "fractions", "table", "number"],
+)
+def test_worlds_are_named_by_rising_indices(ids: Any, controls: NDArray[np.float64]) -> None:
+    batch = WorldBatch(WORLDS, 1)
+    for ctrl in controls[:40]:
+        batch.step(ctrl, pedal=True)
+    before, heard = batch.state(), batch.key_events
+    sounding, rows = batch.sounding.copy(), np.size(ids)
+    for change in (
+        lambda: batch.reset(ids=ids),
+        lambda: batch.set_state(before[:rows], ids=ids),
+        lambda: batch.step(np.zeros((rows, 46)), ids=ids),
+    ):
+        with pytest.raises(ValueError, match="ids must"):
+            change()
+    np.testing.assert_array_equal(batch.state(), before)
+    np.testing.assert_array_equal(batch.sounding, sounding)
+    assert batch.pedal.all()
+    assert batch.key_events is heard
+
+
+def test_none_can_be_named(controls: NDArray[np.float64]) -> None:
+    batch = WorldBatch(WORLDS, 1)
+    batch.step(controls[0])
+    before = batch.state()
+    batch.reset(ids=[])
+    np.testing.assert_array_equal(batch.state(), before)
 
 
 def test_wrong_input() -> None:

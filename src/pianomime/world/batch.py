@@ -35,11 +35,14 @@ _NUMBER = 1  # Batch.warning holds (last info, number of warnings) of each kind.
 class WorldBatch(WorldState):
     """B worlds that step together; each behaves as one `World` does, bit for bit.
 
+    Where some of them are named, their indices `ids` rise: each stands once, and none is a mask.
+
     Attributes:
         model: the MuJoCo model, shared by all worlds; read-only.
         pedal: (B,) bool, whether each sustain pedal is down.
         sounding: (B, 88) bool: keys that sound, as they sense it (see `world.key_sensor`).
-        key_events: note-ons and note-offs of the last step, timed between physics steps.
+        key_events: note-ons and note-offs of the last step, timed between physics steps; those of
+            a world that was reset or restored since are gone, as in a `World`.
         blow_ups: (B,) int, number of control steps since each world's last reset in which its
             physics became unstable; it is then recovered as a `World` is.
     """
@@ -72,6 +75,7 @@ class WorldBatch(WorldState):
         self.blow_ups = np.zeros(worlds, np.int64)
         self.sounding = np.zeros((worlds, KEYS), bool)
         self.pedal = np.zeros(worlds, bool)
+        self.key_events = NOTHING
         self.reset()
 
     def __len__(self) -> int:
@@ -84,10 +88,11 @@ class WorldBatch(WorldState):
         Args:
             qpos: (142,) or (54,) for all worlds, or (n, 142) or (n, 54) with a row for each, as
                 in `World.reset`; None for the rest pose.
-            ids: (n,) indices of the worlds; None for all.
+            ids: (n,) rising indices of the worlds; None for all.
 
         Raises:
-            ValueError: `qpos` has another shape or is not finite.
+            ValueError: `qpos` has another shape or is not finite, or `ids` are no rising indices;
+                nothing is changed then.
         """
         which = self._which(ids)
         start = np.broadcast_to(starting_positions(qpos), (len(which), LAYOUT.qpos_size))
@@ -103,11 +108,12 @@ class WorldBatch(WorldState):
             ctrl: (n, 46) targets of the position actuators, or (n, S, 46), as in `World.step`
                 [rad, m].
             pedal: (n,) bool, or one for all.
-            ids: (n,) indices of the worlds to step; None for all. The others stay as they are, and
-                have no key events.
+            ids: (n,) rising indices of the worlds to step; None for all. The others stay as they
+                are, and have no key events.
 
         Raises:
-            ValueError: `ctrl` has another shape or is not finite.
+            ValueError: `ctrl` has another shape or is not finite, or `ids` are no rising indices;
+                nothing is changed then.
         """
         which = self._which(ids)
         targets = controls_of_frame(ctrl, 1, len(which), self.model.nu)
@@ -155,10 +161,11 @@ class WorldBatch(WorldState):
 
         Args:
             state: (S,) for all worlds, or (n, S) with a row for each.
-            ids: (n,) indices of the worlds; None for all.
+            ids: (n,) rising indices of the worlds; None for all.
 
         Raises:
-            ValueError: `state` has another shape or is not finite.
+            ValueError: `state` has another shape or is not finite, or `ids` are no rising indices;
+                nothing is changed then.
         """
         which = self._which(ids)
         rows = (len(which), mujoco.mj_stateSize(self.model, STATE))
@@ -170,12 +177,25 @@ class WorldBatch(WorldState):
         self._listen(which)
 
     def _listen(self, which: NDArray[np.int64]) -> None:
-        """Let the keys that are pressed sound, without an event."""
+        """Let the keys of some worlds that are pressed sound, without an event."""
         self.sounding[which] = pressed(self._positions()[which])
-        self.key_events = NOTHING
+        self.key_events = self.key_events.without(which)
 
     def _which(self, ids: ArrayLike | None) -> NDArray[np.int64]:
-        return np.arange(len(self)) if ids is None else np.asarray(ids, np.int64)
+        if ids is None:
+            return np.arange(len(self))
+        given = np.asarray(ids)
+        if not given.size and given.ndim == 1:
+            return np.zeros(0, np.int64)
+        # A mask would name worlds 0 and 1; what does not rise MuJoCo refuses, but in the middle.
+        if given.ndim != 1 or given.dtype.kind not in "iu":
+            raise ValueError(f"ids must be indices of worlds, not {given.dtype} {given.shape}")
+        which = given.astype(np.int64)
+        if which[0] < 0 or which[-1] >= len(self) or (np.diff(which) <= 0).any():
+            raise ValueError(
+                f"ids must rise from 0 or more to at most {len(self) - 1}, each once, not {which}"
+            )
+        return which
 
     def _positions(self) -> NDArray[np.float64]:
         positions: NDArray[np.float64] = self._batch.bind("qpos")

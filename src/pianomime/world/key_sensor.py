@@ -45,6 +45,11 @@ class KeyEvents(NamedTuple):
         """These events, so much later [s]."""
         return self._replace(time=self.time + seconds)
 
+    def without(self, worlds: NDArray[np.int64]) -> KeyEvents:
+        """These events but for those of some worlds, given by their indices (n,)."""
+        kept = ~np.isin(self.world, worlds)
+        return KeyEvents(*(column[kept] for column in self))
+
     def followed_by(self, others: KeyEvents) -> KeyEvents:
         """These events, then others."""
         if not len(self.key) or not len(others.key):
