@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _MOST_LAYERS, _WIDEST = 8, 8192
 """Of a network: what a damaged file asks for must not fill the memory."""
+_ROUNDING = 1e-6
+"""Share of a unit by which its multiple may be off, as 3 * 0.005 is from 0.015."""
 
 
 def within(name: str, value: float, least: float, most: float = math.inf) -> None:
@@ -41,6 +43,24 @@ def above_zero(name: str, value: float) -> None:
         raise InputError(f"{name.replace('_', '-')} must be a number, not {value!r}")
     if not 0 < value < math.inf:
         raise InputError(f"{name.replace('_', '-')} must be more than 0, not {value:g}")
+
+
+def multiple(name: str, value: float, unit: float) -> None:
+    """Refuse a time that is no whole multiple of another, or negative, infinite or NaN.
+
+    Args:
+        name: of the setting.
+        value: that was given [s].
+        unit: that it must be a multiple of [s].
+
+    Raises:
+        InputError: it is none; the message names it as the command line does.
+    """
+    within(name, value, 0)
+    if abs(value / unit - round(value / unit)) > _ROUNDING:
+        raise InputError(
+            f"{name.replace('_', '-')} must be a multiple of {unit:g} s, not {value:g}"
+        )
 
 
 def widths(name: str, layers: Sequence[int]) -> None:

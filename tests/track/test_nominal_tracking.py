@@ -187,7 +187,16 @@ def test_where_keys_lie_is_found_by_touch(aside: float) -> None:
     assert keys_aside(world, PAPER) == pytest.approx(aside, abs=0.0006)
 
 
-@pytest.mark.parametrize("wrong", [{"proportional": -1.0}, {"most": 0.0}, {"filter": float("nan")}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"proportional": -1.0},
+        {"most": 0.0},
+        {"filter": float("nan")},
+        {"settle": 0.125},
+        {"settle": -0.05},
+    ],
+)
 def test_wrong_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match=next(iter(wrong))):
         replace(NominalTrackingConfig(), **wrong)

@@ -110,6 +110,44 @@ def test_a_reset_forgets_what_was_sent() -> None:
     np.testing.assert_array_equal(world.qpos, still.qpos)
 
 
+def test_a_state_that_is_restored_forgets_what_was_sent() -> None:
+    world = PerturbedWorld(Perturbation(delay=0.05), quiet=True)
+    still = world.state()
+    world.step(controls(1)[0])
+    world.set_state(still)
+    world.step(np.zeros(LAYOUT.ctrl_size))
+    rested = World(quiet=True)
+    rested.set_state(still)
+    rested.step(np.zeros(LAYOUT.ctrl_size))
+    np.testing.assert_array_equal(world.qpos, rested.qpos)
+
+
+def test_a_copy_goes_on_as_its_world_does() -> None:
+    """Bit for bit, with the controls that wait, and in the middle of a frame."""
+    world = PerturbedWorld(replace(ALL, delay=0.035), quiet=True)
+    sent = np.repeat(controls(6), 2, axis=0)
+    for ctrl in sent[:5]:
+        world.step(ctrl, parts=2)
+    other = world.copy(quiet=True)
+    assert (other.perturbation, other.model is world.model) == (world.perturbation, True)
+    went = []
+    for each in (world, other):  # One after the other: what waits belongs to each alone.
+        for ctrl in sent[5:]:
+            each.step(ctrl, parts=2)
+        went.append(each.state())
+    np.testing.assert_array_equal(*went)
+    again = other.copy().copy()
+    for each in (other, again):
+        each.step(sent[0])
+    np.testing.assert_array_equal(again.state(), other.state())
+
+
+@pytest.mark.parametrize("steps", range(60))
+def test_every_whole_number_of_steps_is_a_delay(steps: int) -> None:
+    assert Perturbation(delay=steps * PHYSICS_DT).delay_steps == steps
+    assert Perturbation(delay=round(0.005 * steps, 3)).delay_steps == steps
+
+
 def test_sensors_are_as_noisy_as_they_are_said_to_be() -> None:
     world = World(quiet=True)
     noisy = Perturbation(joint_noise=0.03, slide_noise=0.003)
@@ -137,6 +175,8 @@ def test_sensors_are_as_noisy_as_they_are_said_to_be() -> None:
         {"joint_noise": -0.1},
         {"slide_noise": float("nan")},
         {"delay": -0.005},
+        {"delay": 0.002},
+        {"delay": 0.0126},
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(wrong: dict[str, float]) -> None:

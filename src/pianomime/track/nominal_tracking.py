@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.keyboard import FRAME_SECONDS
 from pianomime.short_repr import short_repr
 from pianomime.track.calibration import hand_along
-from pianomime.validation import above_zero, finite
+from pianomime.validation import above_zero, finite, multiple
 from pianomime.world import World
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
@@ -42,10 +43,12 @@ class NominalTrackingConfig:
     """Time constant of the filter of errors, by the standard deviation of a joint's noise
     [s/rad]: where measurements are exact, nothing is filtered."""
     settle: float = 0.5
-    """Time for which the hands are held at rest before the song [s]."""
+    """Time for which the hands are held at rest before the song [s]; whole frames of 0.05 s, so
+    that those of the song begin where the world's do."""
 
     def __post_init__(self) -> None:
         finite(self)
+        multiple("settle", self.settle, FRAME_SECONDS)
         for name in ("most", "most_slide"):
             above_zero(name, getattr(self, name))
 

@@ -48,7 +48,9 @@ class KeyEvents(NamedTuple):
     def without(self, worlds: NDArray[np.int64]) -> KeyEvents:
         """These events but for those of some worlds, given by their indices (n,)."""
         kept = ~np.isin(self.world, worlds)
-        return KeyEvents(*(column[kept] for column in self))
+        return KeyEvents(
+            self.world[kept], self.key[kept], self.on[kept], self.time[kept], self.speed[kept]
+        )
 
     def followed_by(self, others: KeyEvents) -> KeyEvents:
         """These events, then others."""

@@ -10,10 +10,10 @@ from itertools import groupby
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pianomime.keyboard import KEYS
-from pianomime.validation import above_zero, within
+from pianomime.validation import above_zero, multiple, within
 from pianomime.world.layout import LAYOUT
 from pianomime.world.model import SIDES, world_model
 from pianomime.world.parameters import PHYSICS_DT
@@ -52,14 +52,15 @@ class Perturbation:
         """Check it.
 
         Raises:
-            InputError: a factor is not above 0, a noise or the delay is negative, or a number is
-                not finite.
+            InputError: a factor is not above 0, a noise or the delay is negative, a number is not
+                finite, or the delay is no whole number of physics steps.
         """
         within("keys_aside", self.keys_aside, -_FAR_ASIDE, _FAR_ASIDE)
         for name in ("friction", "hand_mass", "gain", "key_stiffness"):
             above_zero(name, getattr(self, name))
-        for name in ("joint_noise", "slide_noise", "delay"):
+        for name in ("joint_noise", "slide_noise"):
             within(name, getattr(self, name), 0)
+        multiple("delay", self.delay, PHYSICS_DT)
 
     @property
     def delay_steps(self) -> int:
@@ -113,14 +114,36 @@ class PerturbedWorld(World):
         quiet: bool = False,
     ) -> None:
         self.perturbation = perturbation
-        self._waiting: deque[tuple[float, ...]] = deque()
+        self._waiting: deque[tuple[float, ...]]
         super().__init__(perturbation.model(world), quiet)
 
-    def reset(self, qpos: NDArray[np.float64] | None = None) -> None:  # type: ignore[override]
+    def reset(self, qpos: ArrayLike | None = None) -> None:
         """As `World.reset`; controls that were sent and have not acted yet are lost."""
+        super().reset(qpos)
+        self._forget()
+
+    def set_state(self, state: ArrayLike) -> None:
+        """As `World.set_state`; controls that were sent and have not acted yet are lost.
+
+        They are no part of a state, `copy` has them.
+        """
+        super().set_state(state)
+        self._forget()
+
+    def copy(self, quiet: bool = False) -> PerturbedWorld:
+        """As `World.copy`: it differs as this one does, and what was sent acts in it as well."""
+        other = PerturbedWorld.__new__(PerturbedWorld)
+        other.perturbation = self.perturbation
+        # The model is perturbed already.
+        World.__init__(other, self.model, quiet)
+        self._continue_in(other)
+        other._waiting = self._waiting.copy()
+        return other
+
+    def _forget(self) -> None:
+        """Have the control of the rest pose act until the first one that is sent now does."""
         rest = (0.0,) * LAYOUT.ctrl_size
         self._waiting = deque([rest] * self.perturbation.delay_steps)
-        super().reset(qpos)
 
     def _hold(
         self,

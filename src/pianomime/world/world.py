@@ -179,10 +179,7 @@ class World(WorldState):
             quiet: as of a new world.
         """
         other = World(self.model, quiet)
-        mujoco.mj_copyData(other.data, self.model, self.data)
-        other.blow_ups, other.pedal = self.blow_ups, self.pedal
-        other._substep = self._substep
-        other.sounding, other.key_events = self.sounding.copy(), self.key_events
+        self._continue_in(other)
         return other
 
     @property
@@ -204,6 +201,13 @@ class World(WorldState):
         mujoco.mj_kinematics(self.model, self.data)
         tips: NDArray[np.float64] = self.data.site_xpos[self._tips]
         return tips
+
+    def _continue_in(self, other: World) -> None:
+        """Bring another world of the same model into the state of this one."""
+        mujoco.mj_copyData(other.data, self.model, self.data)
+        other.blow_ups, other.pedal = self.blow_ups, self.pedal
+        other._substep = self._substep
+        other.sounding, other.key_events = self.sounding.copy(), self.key_events
 
     def _listen(self) -> None:
         """Let the keys that are pressed sound, without an event."""
