@@ -22,7 +22,7 @@ class Collect:
     """Make a data set for imitation from what trained experts play.
 
     OUT is a zarr 3 group of documented arrays: state, goal, fingertips, base control, residual and
-    action of every frame, one episode after the other.
+    action of every frame, one episode after the other, all played in one world.
 
     Examples:
       pianomime collect out/experts-FOLDER-best -o experts.zarr
@@ -46,7 +46,7 @@ class Collect:
         """Collect.
 
         Raises:
-            InputError: a run or a file cannot be used.
+            InputError: a run or a file cannot be used, or they are of different worlds.
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.extras import extra

@@ -12,6 +12,7 @@ import zarr
 
 from pianomime.commands.collect import Collect
 from pianomime.errors import InputError
+from pianomime.learn.data.dataset import trajectory_dataset
 from pianomime.learn.data.episode import COLUMNS, Episode
 from pianomime.learn.data.format import VERSION
 from pianomime.learn.data.published import published_episodes, world_order
@@ -20,8 +21,10 @@ from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert import load_expert, train_expert
 from pianomime.learn.expert.expert_run import find_expert_runs
 from pianomime.plan.demonstration import Demonstration
+from pianomime.sealed_json import sealed
 from pianomime.world import World
 from pianomime.world.parameters import key_travel
+from pianomime.world_names import WORLDS
 
 
 @pytest.fixture
@@ -266,6 +269,53 @@ def test_a_data_set_of_an_older_version_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "notes").mkdir()
     with pytest.raises(InputError, match="something else"):
         write_trajectories(tmp_path / "notes", iter([Episode("one", 0.0, "ik", columns)]))
+
+
+def filled(name: str, world: str, song: int = -1) -> Episode:
+    columns = {each: np.ones((4, *one.shape), one.dtype) for each, one in COLUMNS.items()}
+    return Episode(name, 0.0, "ik", columns, song, "train", world)
+
+
+def test_a_data_set_names_the_world(
+    two_notes: Demonstration, tmp_path: Path, small_search: ExpertConfig
+) -> None:
+    two_notes.save(tmp_path / "demo.npz")
+    for world in WORLDS:
+        env = dataclasses.replace(small_search.env, world=world)
+        short = dataclasses.replace(small_search, total_steps=128, env=env)
+        train_expert(tmp_path / "demo.npz", tmp_path / "runs" / world, short, threads=1)
+        out = tmp_path / f"{world}.zarr"
+        Collect((tmp_path / "runs" / world,), out).run()
+        assert TrajectoryData.open(out).episode(0).world == world
+    with pytest.raises(InputError, match="a data set is of one world"):
+        Collect((tmp_path / "runs",), tmp_path / "experts.zarr").run()
+
+
+def test_a_data_set_that_names_no_world_is_of_the_papers(tmp_path: Path) -> None:
+    out = tmp_path / "experts.zarr"
+    write_trajectories(out, iter([filled("one", "paper")]))
+    group = zarr.open_group(str(out))
+    content = {name: value for name, value in group.attrs.asdict().items() if name != "digest"}
+    for episode in content["episodes"]:
+        del episode["world"]
+    group.attrs.put(sealed(content))
+    assert TrajectoryData.open(out).episode(0).world == "paper"
+
+
+def test_episodes_of_different_worlds_are_refused_in_one_line(tmp_path: Path) -> None:
+    mixed = iter([filled("one", "paper"), filled("two", "solid")])
+    with pytest.raises(InputError, match=r"two .* world solid, one in paper") as error:
+        write_trajectories(tmp_path / "mixed.zarr", mixed)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "mixed.zarr").exists()
+    sources = []
+    for song, world in enumerate(WORLDS):
+        sources.append(tmp_path / f"{world}.zarr")
+        write_trajectories(sources[-1], iter([filled(world, world, song)]))
+        assert len(trajectory_dataset(sources[-1:])) == 1
+    with pytest.raises(InputError, match="a data set is of one world") as error:
+        trajectory_dataset(sources)
+    assert "\n" not in str(error.value)
 
 
 class Killed(BaseException):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.learn.data.published import read_published
-from pianomime.learn.data.trajectories import TrajectoryData
+from pianomime.learn.data.trajectories import TrajectoryData, check_one_world
 from pianomime.plan.demonstration import TRAIN, Demonstration, is_demonstration
 from pianomime.short_repr import short_repr
 from pianomime.shown import shown
@@ -170,10 +170,12 @@ def trajectory_dataset(
         base: the base controller that all must have been recorded with, if that matters.
 
     Raises:
-        InputError: a data set is not there or cannot be used, or values in it are not finite.
+        InputError: a data set is not there or cannot be used, values in it are not finite, or
+            episodes were played in different worlds.
     """
 
     def clips() -> Iterator[tuple[str, int, dict[str, NDArray[Any]]]]:
+        first = None
         for source in sources:
             data = TrajectoryData.open(source)
             for number, episode in enumerate(data.episodes):
@@ -183,6 +185,8 @@ def trajectory_dataset(
                             f"{source}: {episode['name']} has the base controller "
                             f"{episode['base']}; this policy needs {base}"
                         )
+                    first = first or episode
+                    check_one_world(first, episode["name"], episode["world"])
                     song = _song_number(episode["song_id"], episode["name"])
                     yield episode["name"], song, data.columns(number, columns)
 

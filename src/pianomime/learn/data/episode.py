@@ -33,6 +33,7 @@ class Episode:
         columns: arrays (T, ...) by the names in `COLUMNS`.
         song_id: number that episodes of one song share; -1 if unknown.
         split: part of the data set that it belongs to; only "train" is for training.
+        world: name of the world in which it was played.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Episode:
     columns: dict[str, NDArray[Any]]
     song_id: int = -1
     split: str = "train"
+    world: str = PAPER
 
     __repr__ = short_repr
 
@@ -113,7 +115,13 @@ def play_episode(run: ExpertRun) -> Episode:
         demonstration.plan.finger_key,
     )
     return Episode(
-        demonstration.score.title, f1, env.base, columns, demonstration.song_id, demonstration.split
+        demonstration.score.title,
+        f1,
+        env.base,
+        columns,
+        demonstration.song_id,
+        demonstration.split,
+        env.world,
     )
 
 

@@ -10,7 +10,7 @@ Read it with no more than zarr:
         joints, action = data["joints"][first:end], data["action"][first:end]
 
 The attribute `description` of every array says what it holds; the attribute `episodes` of the group
-has the name, the F1, the base controller, the song and the split of each episode.
+has the name, the F1, the base controller, the song, the split and the world of each episode.
 
 Every chunk ends with a checksum (CRC32C), which all readers of zarr compare. The attributes have a
 digest of each column of each episode, too: a chunk that is gone reads as zeros.
@@ -38,7 +38,9 @@ from pianomime.schema import Field, ListOf, Schema, short
 from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
 from pianomime.short_repr import short_repr
+from pianomime.shown import shown
 from pianomime.staging import hold
+from pianomime.world_names import PAPER, WORLDS
 
 _CHUNK = 4096
 """Rows in a chunk of the file."""
@@ -49,6 +51,7 @@ _EPISODE: dict[str, Schema] = {
     "base": Field("text", choices=("ik", "dynamic")),
     "song_id": Field("int", (), -1),
     "split": Field("text"),
+    "world": Field("text", choices=WORLDS, optional=True),
     "digests": _DIGESTS,
 }
 """What is recorded of each episode."""
@@ -66,14 +69,14 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
 
     Args:
         path: of the data set, a folder.
-        episodes: what to write.
+        episodes: what to write, all of one world.
 
     Returns:
         Number of episodes.
 
     Raises:
-        InputError: there is something else at the place, another process writes there, or there
-            are no episodes.
+        InputError: there is something else at the place, another process writes there, there are
+            no episodes, or they were played in different worlds.
         OSError: it cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -100,6 +103,8 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
         ends = [0]
         rows: list[Any] = []
         for episode in episodes:
+            if rows:
+                check_one_world(rows[0], episode.name, episode.world)
             for name, column in COLUMNS.items():
                 _array(group, name).append(episode.columns[name].astype(column.dtype, copy=False))
             ends.append(ends[-1] + len(episode.columns["goal"]))
@@ -110,6 +115,7 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
                     "base": episode.base,
                     "song_id": episode.song_id,
                     "split": episode.split,
+                    "world": episode.world,
                     "digests": {name: _digest(episode.columns, name) for name in COLUMNS},
                 }
             )
@@ -138,7 +144,7 @@ class TrajectoryData:
     Attributes:
         group: the zarr group.
         ends: (E,) one past the last row of each episode.
-        episodes: name, f1, base, song_id and split of each, see `Episode`.
+        episodes: name, f1, base, song_id, split and world of each, see `Episode`.
     """
 
     group: zarr.Group
@@ -182,7 +188,8 @@ class TrajectoryData:
         # A damaged store raises what its codecs and its metadata happen to raise.
         except Exception as error:
             raise InputError(f"{path}: damaged ({reason_of(error)})") from error
-        return cls(group, ends, content["episodes"])
+        # Data sets that do not say it were played in the paper's.
+        return cls(group, ends, [{"world": PAPER, **facts} for facts in content["episodes"]])
 
     def __len__(self) -> int:
         """Number of episodes."""
@@ -219,6 +226,25 @@ class TrajectoryData:
             self.columns(number, COLUMNS),
             facts["song_id"],
             facts["split"],
+            facts["world"],
+        )
+
+
+def check_one_world(first: Mapping[str, Any], name: str, world: str) -> None:
+    """Refuse an episode of another world than the first: controls lead elsewhere there.
+
+    Args:
+        first: name and world of the first episode.
+        name: of another one.
+        world: in which that was played.
+
+    Raises:
+        InputError: they are of different worlds.
+    """
+    if world != first["world"]:
+        raise InputError(
+            f"{shown(name)} was played in the world {world}, {shown(first['name'])} in "
+            f"{first['world']}: a data set is of one world"
         )
 
 
