@@ -16,8 +16,10 @@ from pianomime.world import World, WorldBatch
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT
 from pianomime.world.model import SIDES, build_spec, name_of, world_model
+from pianomime.world.one_hand import one_hand_model
 from pianomime.world.overlap import Overlap, overlap
 from pianomime.world.solid import JOINT_SPEED, RAIL_FORCE, RAIL_SPEED
+from pianomime.world.state import reset_pose_after_instability
 from pianomime.world_names import WORLDS
 
 PAPER, SOLID = world_model("paper"), world_model("solid")
@@ -236,6 +238,60 @@ def test_a_leap_along_the_keyboard(name: str) -> None:
         assert max(forces) > RAIL_FORCE
 
 
+ALONG = [joints.start + LAYOUT.slide for joints in LAYOUT.joints]
+
+
+@pytest.mark.parametrize(
+    "rails",
+    [(0.103, -0.103), (0.15, -0.15), (0.2, -0.1), (0.7, 0.45), (-0.45, -0.74), (0.3, -0.3), (0, 0)],
+)
+def test_hands_have_room_after_broken_physics(rails: tuple[float, float]) -> None:
+    """Where open hands would be inside each other they are moved apart; left and right rail."""
+    before = np.zeros((2, LAYOUT.qpos_size))
+    before[:, ALONG] = rails, (-0.3, 0.3)
+    opened = reset_pose_after_instability(before, SOLID)
+    assert overlap(opened[:, KEYS:]).hands.tolist() == [0.0, 0.0]
+    np.testing.assert_array_equal(opened[1], before[1])
+    if overlap(before[:1, KEYS:]).hands[0] == 0.0:
+        np.testing.assert_array_equal(opened[0], before[0])
+    else:
+        assert np.abs(opened[0, ALONG] - rails).max() < 0.15
+    low, high = SOLID.jnt_range[ALONG].T
+    assert (opened[0, ALONG] >= low).all()
+    assert (opened[0, ALONG] <= high).all()
+    np.testing.assert_array_equal(np.delete(opened[0], ALONG), 0.0)
+    # In the paper's world hands may be inside each other.
+    np.testing.assert_array_equal(reset_pose_after_instability(before, PAPER), before)
+    # Where the other hand is out of the way there is room.
+    alone = one_hand_model(1, "solid")
+    np.testing.assert_array_equal(reset_pose_after_instability(before, alone), before)
+
+
+def test_worlds_recover_with_room() -> None:
+    """Two fists, next to each other, where there is no room for two open hands."""
+    fist = np.zeros(LAYOUT.hand_joints)
+    for joints in LAYOUT.finger_joints[1:]:
+        fist[joints] = 1.0
+    pose = np.zeros(LAYOUT.qpos_size)
+    for joints in LAYOUT.joints:
+        pose[joints] = fist
+    pose[ALONG] = 0.103, -0.103
+    world, batch = World("solid", quiet=True), WorldBatch(2, 1, quiet=True, model="solid")
+    world.reset(pose)
+    state = world.state()
+    state[1 + LAYOUT.qpos_size + KEYS] = 1e12
+    world.set_state(state)
+    batch.set_state(state)
+    world.step(TOGETHER)
+    batch.step(np.stack([TOGETHER, TOGETHER]))
+    assert world.blow_ups == 1
+    assert overlap(world.qpos_hands[None]).hands[0] == 0.0
+    np.testing.assert_array_equal(batch.qpos, [world.qpos] * 2)
+    for _ in range(20):
+        world.step(TOGETHER)
+    assert world.blow_ups == 1
+
+
 def test_the_same_again_and_in_a_batch() -> None:
     """Colliding hands move alike in a World, in its copy, and in a batch of any threads."""
     draw = np.random.default_rng(0)
@@ -256,7 +312,8 @@ def test_the_same_again_and_in_a_batch() -> None:
             each.step(ctrl)
         for batch in batches:
             batch.step(np.stack([ctrl, ctrl]))
-        contacts += sum((world.data.contact.geom >= PAPER.ngeom).any(axis=1))
+        # Geoms of hands that collide with hands; keys and what touches them have the first bit.
+        contacts += (SOLID.geom_contype[world.data.contact.geom] > 1).all(axis=1).sum()
     assert contacts > 10
     np.testing.assert_array_equal(copied.state(), world.state())
     for batch in batches:

@@ -146,7 +146,8 @@ class WorldBatch(WorldState):
             if not self.quiet:
                 worlds = ", ".join(map(str, which[broken]))
                 warnings.warn(f"{BLOW_UP} (worlds {worlds})", PhysicsWarning, stacklevel=3)
-            self._put(reset_pose_after_instability(before[broken]), which[broken])
+            recovered = reset_pose_after_instability(before[broken], self.model)
+            self._put(recovered, which[broken])
             events = events.followed_by(silenced(lost, substeps * PHYSICS_DT))
         events = events._replace(world=which[events.world])
         self.key_events = self.key_events.followed_by(events.later(done * PHYSICS_DT))

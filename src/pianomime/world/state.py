@@ -12,7 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from pianomime.keyboard import KEYS
 from pianomime.world.key_sensor import PRESSED_WITHIN, KeyEvents
 from pianomime.world.layout import LAYOUT
+from pianomime.world.model import SIDES, name_of
+from pianomime.world.overlap import overlap
 from pianomime.world.parameters import SUBSTEPS, key_travel
+from pianomime.world_names import SOLID
 
 _DOWN = 0.002
 """[rad] A key turned by more than this must not fall asleep."""
@@ -28,6 +31,14 @@ RESETS = [
     int(mujoco.mjtWarning.mjWARN_BADQACC),
 ]
 """MuJoCo's warnings that come with an automatic reset, that is, of unstable physics."""
+_ALONG = [joints.start + LAYOUT.slide for joints in LAYOUT.joints]
+"""Positions of both forearms along the keyboard, left and right."""
+_OUTWARD = np.array([-1.0, 1.0])
+"""Where left and right are on the outside."""
+_PARTING = 5e-4
+"""[m] Steps in which each hand is moved away from the other, to recover."""
+_AT_ONCE = 64
+"""Poses that are looked at together: one by one takes ten times as long."""
 BLOW_UP = "the physics broke: hands opened above the keys where they were, keys up"
 """Message of `PhysicsWarning`."""
 
@@ -132,16 +143,53 @@ def starting_positions(qpos: ArrayLike | None) -> NDArray[np.float64]:
     return start
 
 
-def reset_pose_after_instability(qpos: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(..., 142) Recovery pose: as at rest, but with the forearms where they are.
+def reset_pose_after_instability(
+    qpos: NDArray[np.float64], model: mujoco.MjModel
+) -> NDArray[np.float64]:
+    """(..., 142) Recovery pose: as at rest, but with the forearms along the keyboard as they are.
+
+    Hands that were fists, or one above the other, may have no room to be opened. In the solid
+    world they then move apart along the keyboard, both as far, the shortest way.
 
     Args:
         qpos: (..., 142) positions before the step in which the physics became unstable.
+        model: of the world.
     """
     opened = np.zeros_like(qpos)
-    along = [joints.start + LAYOUT.slide for joints in LAYOUT.joints]
-    opened[..., along] = qpos[..., along]
+    opened[..., _ALONG] = qpos[..., _ALONG]
+    if name_of(model) == SOLID:
+        for pose in opened.reshape(-1, LAYOUT.qpos_size):
+            if _hands_touch(pose, model):
+                _part(pose, model)
     return opened
+
+
+def _hands_touch(qpos: NDArray[np.float64], model: mujoco.MjModel) -> bool:
+    """Whether the hands touch in a pose (142,); they never do where one is out of the way."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    sides = [model.body(body).name.partition("_")[0] for body in range(model.nbody)]
+    touching = {
+        frozenset(sides[body] for body in model.geom_bodyid[pair]) for pair in data.contact.geom
+    }
+    return frozenset(SIDES) in touching
+
+
+def _part(qpos: NDArray[np.float64], model: mujoco.MjModel) -> None:
+    """Move the hands of a pose (142,) apart until they do not overlap; in place."""
+    low, high = model.jnt_range[_ALONG].T
+    steps = np.arange(1, round((high - low).max() / _PARTING))
+    # Past each other, where that is nearer.
+    moves = _PARTING * np.stack([steps, -steps], axis=1).reshape(-1, 1) * _OUTWARD
+    tried = np.clip(qpos[_ALONG] + moves, low, high)
+    for some in np.split(tried, range(_AT_ONCE, len(tried), _AT_ONCE)):
+        poses = np.tile(qpos, (len(some), 1))
+        poses[:, _ALONG] = some
+        free = np.flatnonzero(overlap(poses[:, KEYS:]).hands == 0.0)
+        if len(free):
+            qpos[:] = poses[free[0]]
+            return
 
 
 def controls_of_frame(ctrl: ArrayLike, parts: int, *shape: int) -> NDArray[np.float64]:

@@ -41,7 +41,7 @@ class World(WorldState):
             unstable. Such a step, or the part of it with one of several controls, ends in a
             recovery pose: forearms along the keyboard where they were before it, hands open above
             the keys, all keys up. (Wedged fingers left in place would become unstable again at
-            once.)
+            once.) In the solid world hands that would overlap so are moved apart.
         quiet: whether unstable physics raises no `PhysicsWarning`.
     """
 
@@ -137,7 +137,7 @@ class World(WorldState):
             if not self.quiet:
                 warnings.warn(BLOW_UP, PhysicsWarning, stacklevel=3)
             events = silenced(self.sounding[None], substeps * PHYSICS_DT)
-            self._put(reset_pose_after_instability(before))
+            self._put(reset_pose_after_instability(before, self.model))
         else:
             events = sense(moved[0], moved[1], self.sounding[None])
         self.key_events = self.key_events.followed_by(events.later(done * PHYSICS_DT))
