@@ -113,6 +113,14 @@ def test_joints_have_their_limits_and_damping(both: Both) -> None:
         assert float(limit.attrib["velocity"]) == min(limits.velocity[place], 1e6)
 
 
+def test_hinges_have_shadows_speeds_not_those_of_the_world(both: Both) -> None:
+    joints = {joint.attrib["name"]: joint for joint in Xml.parse(both.path).iter("joint")}
+    for name, speed in (("rh_FFJ3", 2.0), ("lh_WRJ1", 2.0), ("lh_THJ5", 4.0), ("rh_THJ4", 4.0)):
+        limit = joints[name].find("limit")
+        assert limit is not None
+        assert float(limit.attrib["velocity"]) == speed
+
+
 def reach(
     model: mujoco.MjModel, data: mujoco.MjData, body: int, way: np.ndarray, everything: bool
 ) -> float:

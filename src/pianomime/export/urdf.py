@@ -3,6 +3,9 @@
 URDF has neither capsules, nor bodies with several joints, nor tendons. A capsule becomes a cylinder
 and two spheres; each slide of a forearm but the last carries a link without mass; and that J1 and
 J2 of a finger have one motor is not said: both joints are free, and have its limits.
+
+Limits of speed are those of `Limits`: of wrists and fingers Shadow Robot's, over which the world
+lets them go, of slides the world's own.
 """
 
 from __future__ import annotations
