@@ -47,6 +47,9 @@ def tracked(performance: Performance, reference: Reference, case: Case) -> Perfo
         performance: found in the nominal world.
         reference: what the hands did in it.
         case: how the world differs; it knows the delay, and how noisy the sensors are.
+
+    Raises:
+        InputError: the keys lie further aside than touch can tell, see `keys_aside`.
     """
     perturbation = case.perturbation
     world = PerturbedWorld(perturbation, performance.world, quiet=True)

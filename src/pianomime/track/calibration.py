@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.music import Score
 from pianomime.plan import ZeroShotConfig, ZeroShotPlanner
@@ -29,6 +30,8 @@ _REACH = 0.02
 """[m] How far to each side it is struck: well into its neighbours, if it is where it should be."""
 _STEP = 0.001
 """[m] From one strike to the next."""
+_RANGE = 0.012
+"""[m] How far aside keys may lie, so that neighbours on both sides are met."""
 _EVERY = 0.35
 """[s] From one strike to the next: a forearm moves a millimetre and settles."""
 _HELD = 0.1
@@ -40,11 +43,23 @@ _VELOCITY = 64
 def keys_aside(world: World, nominal: str) -> float:
     """By how much all keys of a world lie further to the treble than in the nominal one [m].
 
+    It is found to half a millimetre, the half of what lies between two strikes, in a range of 12 mm
+    to each side: beyond it the sweep ends before a neighbour is met on one side.
+
     Args:
         world: at rest; the calibration is played in it.
         nominal: name of the world that is known.
+
+    Raises:
+        InputError: there is no such world, or a neighbour was met on one side alone, or on none.
     """
     low, high = _neighbours(world, nominal)
+    if not (low and high):
+        raise InputError(
+            "where the keys lie cannot be found: no key "
+            f"{'below' if not low else 'above'} the one that was struck has sounded; they lie "
+            f"further aside than {1000 * _RANGE:g} mm, or do not sound"
+        )
     known_low, known_high = _nominal_neighbours(nominal)
     return _STEP * ((low - known_low) + (known_high - high)) / 2
 
