@@ -164,6 +164,17 @@ def test_a_filter_keeps_noise_from_the_hands(reference: Reference) -> None:
     np.testing.assert_array_equal(path(reference, noisy), path(reference, noisy))
 
 
+def test_noise_of_the_slides_alone_is_not_filtered(reference: Reference) -> None:
+    """As the settings say: the filter knows the joints' noise alone."""
+    noisy, still = Perturbation(slide_noise=0.003), World(quiet=True)
+    config = NominalTrackingConfig(integral=0.0)
+    sent = []
+    for each in (config, replace(config, filter=0.0)):
+        controller = NominalTrackingController(reference, Sensors(noisy), each)
+        sent.append([controller.control(step, still) for step in range(-20, 0)])
+    np.testing.assert_array_equal(*sent)
+
+
 def test_hands_go_where_the_keys_lie(reference: Reference) -> None:
     went = path(reference, Perturbation(keys_aside=0.005), aside=0.005)
     for index, side in enumerate(SIDES):
@@ -181,10 +192,18 @@ def test_hands_are_moved_along_the_keyboard(side: Side) -> None:
     np.testing.assert_allclose(moved, np.tile([0.0, 0.01, 0.0], (len(moved), 1)), atol=1e-12)
 
 
-@pytest.mark.parametrize("aside", [-0.004, 0.0, 0.003])
+@pytest.mark.parametrize("aside", [-0.012, -0.004, 0.0, 0.003, 0.012])
 def test_where_keys_lie_is_found_by_touch(aside: float) -> None:
     world = PerturbedWorld(Perturbation(keys_aside=aside), quiet=True)
     assert keys_aside(world, PAPER) == pytest.approx(aside, abs=0.0006)
+
+
+@pytest.mark.parametrize(("aside", "neighbour"), [(-0.015, "below"), (0.015, "above")])
+def test_keys_that_lie_beyond_the_sweep_are_not_found(aside: float, neighbour: str) -> None:
+    world = PerturbedWorld(Perturbation(keys_aside=aside), quiet=True)
+    with pytest.raises(InputError, match=f"no key {neighbour} .* than 12 mm") as error:
+        keys_aside(world, PAPER)
+    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -40,8 +40,9 @@ class NominalTrackingConfig:
     most_slide: float = 0.02
     """Most that it adds to a slide's target [m]."""
     filter: float = 1.5
-    """Time constant of the filter of errors, by the standard deviation of a joint's noise
-    [s/rad]: where measurements are exact, nothing is filtered."""
+    """Time constant of the filter of all errors, those of slides too, by the standard deviation of
+    the joints' noise alone [s/rad]: where joints are measured exactly, nothing is filtered,
+    however noisy the slides are."""
     settle: float = 0.5
     """Time for which the hands are held at rest before the song [s]; whole frames of 0.05 s, so
     that those of the song begin where the world's do."""
