@@ -4,16 +4,19 @@ import importlib.metadata
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pianomime
 from pianomime import InputError, PlannedPlayer, Score, evaluate, excerpt, load_player, songs
+from pianomime.cli import main
 from pianomime.players import player_names, register_player, registry
 from pianomime.players.receding_horizon import RecedingHorizonPlayer
 from pianomime.players.registry import player_files, player_settings
 from pianomime.policies.methods import bundled_weights, weights_folder
+from pianomime.world_names import WORLDS
 
 PLUGIN = """
 import pianomime
@@ -217,6 +220,35 @@ def test_every_setting_that_is_listed_exists(name: str) -> None:
 
     configs = SETTINGS[name]
     assert configure(player_settings(name), **configs) == tuple(configs.values())
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_settings_are_shown_as_they_are_in_a_world(
+    world: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Oracle: the configs with which the player is made there."""
+    from pianomime.players import builtin
+    from pianomime.players.settings import configure, settings_of
+
+    made: dict[str, Any] = {}
+
+    def noted(settings: dict[str, Any], **configs: Any) -> tuple[Any, ...]:
+        made.update(configs)
+        return configure(settings, **configs)
+
+    monkeypatch.setattr(builtin, "configure", noted)
+    for name in ("zero-shot", "zero-shot-20hz", "zero-shot-ik"):
+        made.clear()
+        load_player(name, world=world)
+        assert player_settings(name, world) == settings_of(**made)
+    main(["players", "zero-shot", "--world", world])
+    apart = "0.002" if world == "solid" else "0.0"
+    assert f"--tracker.apart {apart}\n" in capsys.readouterr().out
+
+
+def test_settings_of_a_world_that_is_not_there_are_one_line() -> None:
+    with pytest.raises(InputError, match="world"):
+        player_settings("zero-shot", "moon")
 
 
 def test_every_public_name_is_there_and_is_listed() -> None:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import tyro
 
+from pianomime.world_names import PAPER, WorldName
+
 _ABOUT = {
     "zero-shot": "plays notes in time, with touch",
     "zero-shot-20hz": "plays frames, as in the paper",
@@ -40,11 +42,12 @@ class Players:
     The last column says whether a player can be used now; below are the commands that help if not.
 
     A setting is an option of `pianomime play` and `pianomime evaluate`; its value is shown as it is
-    at the default effort.
+    at the default effort, in the world that is named.
 
     Examples:
       pianomime players
       pianomime players zero-shot
+      pianomime players zero-shot --world solid
       pianomime play SONG.mid --planner.beam 200 --tracker.force 6
     """
 
@@ -52,6 +55,8 @@ class Players:
         tyro.conf.Positional[str], tyro.conf.arg(metavar="[PLAYER]", help_behavior_hint="")
     ] = ""
     """Whose settings to list."""
+    world: WorldName = PAPER
+    """The world in which it is to play."""
 
     def run(self) -> None:
         """Print the table, or one setting a line, with the value that it has by default.
@@ -66,7 +71,7 @@ class Players:
         if not self.player:
             _print_all()
             return
-        settings = player_settings(self.player)
+        settings = player_settings(self.player, self.world)
         for name, value in settings.items():
             print(f"--{name.replace('_', '-')} {json.dumps(value)}")
         if not settings:

@@ -202,4 +202,19 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "demonstration": {"tracker": DynamicConfig(), **_SAMPLING},
     "demonstration-ik": {"tracker": IkConfig()},
 }
-"""The configs whose fields are the settings of each player, by group, at effort 1."""
+"""The configs whose fields are the settings of each player, by group, at effort 1 in the paper's
+world."""
+
+
+def configs_of(name: str, world: str) -> dict[str, Any]:
+    """The configs whose fields are the settings of a player, by group, at effort 1.
+
+    Args:
+        name: of the player; one that does not come with the program has none.
+        world: name of the world in which it plays.
+    """
+    configs = SETTINGS.get(name, {})
+    if name != "zero-shot":
+        return configs
+    planner, tracker = _notes(world)
+    return {**configs, "planner": planner, "tracker": tracker}

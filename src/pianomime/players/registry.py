@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from pianomime.errors import InputError, unknown_name
-from pianomime.players.builtin import FACTORIES, SETTINGS
+from pianomime.players.builtin import FACTORIES, configs_of
 from pianomime.players.player import Player
 from pianomime.players.plugin import import_factory, one_line, plugin_files
 from pianomime.players.settings import PlayerFactory, flat, settings_of
 from pianomime.policies.methods import METHODS, methods_of, weight_files
-from pianomime.world_names import WORLDS
+from pianomime.world_names import PAPER, WORLDS
 
 EFFORT = 1
 """How hard players try unless told otherwise, 0 to 3."""
@@ -136,18 +136,21 @@ def player_files(source: str | Path) -> list[Path]:
     return _find(source)[1]()
 
 
-def player_settings(name: str) -> dict[str, Any]:
+def player_settings(name: str, world: str = PAPER) -> dict[str, Any]:
     """The settings that a player takes, with their values at the default effort.
 
     Args:
         name: one of `player_names`; players of other packages do not tell their settings.
+        world: name of the world in which it is to play, on which some values depend.
 
     Raises:
-        InputError: there is no such player.
+        InputError: there is no such player or world.
     """
     if name not in player_names():
         raise unknown_name("player", name, player_names())
-    return settings_of(**SETTINGS.get(name, {}))
+    if world not in WORLDS:
+        raise unknown_name("world", world, WORLDS)
+    return settings_of(**configs_of(name, world))
 
 
 _Found = tuple[PlayerFactory, Callable[[], list[Path]]]
