@@ -72,7 +72,9 @@ def first_sound(started: Browsers, song: str, folder: Path) -> float:
         time.sleep(STANDS)
         began = time.perf_counter()
         page.set_input_files("input[type=file]", path)
-        page.wait_for_function(f"{REPLAY}.currentTime > {LEAD_IN_SECONDS + 0.02}", polling=20, timeout=120_000)
+        page.wait_for_function(
+            f"{REPLAY}.currentTime > {LEAD_IN_SECONDS + 0.02}", polling=20, timeout=120_000
+        )
         return time.perf_counter() - began
 
 
