@@ -24,6 +24,7 @@ import numpy as np
 
 import common
 from pianomime import Performance, excerpt, load_player, songs
+from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.music import Score, onset_f1
 from pianomime.plan.demonstration import Demonstration
@@ -220,7 +221,7 @@ def _rendered(song: str, lit: bool) -> dict[str, Any]:
         hands = rendered_video.hands(performance)
         with patch.object(room, "HandDetector", lambda _: hands):
             made = retarget(video, RetargetConfig(midi=midi, hand_model=model))
-            read = retarget(video, RetargetConfig(hand_model=model)).demonstration
+            read = _read(video, model)
     plane = rendered_video.camera()
     pixels = plane.to_pixels(key_centres()[:, :2])
     off = _plane_error(Plane(made.demonstration.homography), plane, pixels)
@@ -231,11 +232,21 @@ def _rendered(song: str, lit: bool) -> dict[str, Any]:
         "worst [mm]": float(off.max()),
         "offset off by [ms]": 1000 * abs(made.demonstration.quality["offset_seconds"]),
         "notes": len(played),
-        "read without MIDI": len(read.score),
+        "read without MIDI": 0 if read is None else len(read),
         "onset F1 without MIDI": onset_f1(
-            (played.key, played.onset), (read.score.key, read.score.onset), 0.1
+            (played.key, played.onset),
+            ([], []) if read is None else (read.key, read.onset),
+            0.1,
         ),
     }
+
+
+def _read(video: Path, model: Path) -> Score | None:
+    """The notes read from a video, if its keys light up."""
+    try:
+        return retarget(video, RetargetConfig(hand_model=model)).demonstration.score
+    except InputError:
+        return None
 
 
 @cache

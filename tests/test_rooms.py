@@ -54,7 +54,7 @@ VIDEO = (
     ("hands",),
     ("notes",),
     ("align", "parallax", "drawing", "remarks"),
-    ("retarget",),
+    ("lit_film", "retarget"),
     ("overlay", "summary"),
 )
 

@@ -107,8 +107,24 @@ def test_the_papers_rule(video, midi, hands):
 
 
 def test_without_midi(video, hands, score):
-    read = retarget(video, RetargetConfig(hand_model=hands)).demonstration.score
+    made = retarget(video, RetargetConfig(hand_model=hands)).demonstration
+    read = made.score
     assert onset_f1((score.key, score.onset), (read.key, read.onset), 0.1) > 0.95
+    assert made.quality["keys_lit_confidence"] > 0.9
+
+
+def test_a_film_whose_keys_do_not_light_up(hands, tmp_path, score, plan, plane, capsys):
+    """Hands play as in the others, and change the look of keys alone."""
+    unlit = tmp_path / "unlit.mp4"
+    made_up.write(unlit, plane, SIZE, score, plan, made_up.times(5.0, 20), light_up=False)
+    out = tmp_path / "out" / "demo.npz"
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["retarget", str(unlit), "--hand-model", str(hands), "-o", str(out)])
+    assert stopped.value.code == 2
+    printed = capsys.readouterr().err.strip().splitlines()[-1]
+    assert "keys do not light up in this film (confidence" in printed
+    assert "--midi FILE" in printed
+    assert not out.parent.exists()
 
 
 @pytest.fixture

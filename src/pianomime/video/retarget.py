@@ -8,9 +8,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
@@ -21,6 +18,7 @@ from pianomime.progress import Progress, no_progress
 from pianomime.shown import shown, title_of
 from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
+from pianomime.video.film.background import background
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.detector import HandDetector, check_mediapipe
@@ -36,7 +34,6 @@ from pianomime.video.notes.offset import Offset, estimate_offset
 from pianomime.video.notes.reading import read_notes
 from pianomime.video.parallax import correct_parallax
 
-_BACKGROUND_FRAMES = 25
 _MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
 """Frames of the longest score; a video may be longer than its header says."""
 _TOO_FEW_TOUCHED = 0.5
@@ -200,10 +197,9 @@ class _Seen:
 def _find_views(given: _Given) -> list[_View]:
     """The ways to see the keyboard, the likeliest first: one, or one for each possible octave."""
     film = given.film
-    background = _background(film)
     if given.points is not None:
         return [_View(given.points.plane.zoomed(1 / film.zoom), given.points.describe())]
-    keyboards = find_keyboards(background)
+    keyboards = find_keyboards(background(film))
     if not keyboards:
         raise InputError(
             f"{film.path}: no keyboard found; mark where it is with `pianomime pick {film.path}`"
@@ -214,19 +210,6 @@ def _find_views(given: _Given) -> list[_View]:
         likeliest = keyboards[0]
         return [_View(likeliest.plane, likeliest.describe(), likeliest if open_octave else None)]
     return [_View(keyboard.plane, keyboard.describe()) for keyboard in keyboards]
-
-
-def _background(film: Film) -> NDArray[np.float32]:
-    """Median of some grey pictures (height, width), 0..1: without hands and lights."""
-    pictures = film.sample(_BACKGROUND_FRAMES)
-    if not pictures:
-        raise InputError(f"{film.path}: no picture in it can be read")
-    # Row by row: all pictures in grey at once take several times their memory.
-    rows = [
-        np.median([picture[row].mean(axis=1, dtype=np.float32) for picture in pictures], axis=0)
-        for row in range(len(pictures[0]))
-    ]
-    return np.asarray(np.stack(rows) / 255, np.float32)
 
 
 def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
@@ -287,24 +270,22 @@ def _best_view(
 def _read_score(film: Film, tracks: HandTracks, light: LightRecord) -> _Timed:
     """The score read from the video itself."""
     read = read_notes(light, tracks, title_of(film.path))
-    if not len(read.score):
+    if not read.lit:
         raise InputError(
-            f"{film.path}: no keys are seen going down or lighting up; give what is played with "
-            "--midi"
+            f"{film.path}: keys do not light up in this film (confidence {read.confidence:.0%}), "
+            "so it does not show what is played: give that with --midi FILE, which may also be "
+            "transcribed from the film's sound (with --notes sound, where `pianomime retarget "
+            "--help` lists it)"
         )
     remarks = []
-    if not read.lit:
-        remarks.append(
-            "no keys light up: notes are read from keys that change their shade when they go down, "
-            "and many are missed (a MIDI file would have them)"
-        )
     if read.touched < _FEW_TOUCHED:
         remarks.append(
             f"the notes are read from the video and doubtful: {read.touched:.0%} have a finger on "
             "their key"
         )
     facts = {
-        "notes_from": "video, from keys that " + ("light up" if read.lit else "go down"),
+        "notes_from": "video, from keys that light up",
+        "keys_lit_confidence": round(read.confidence, 4),
         "notes_touched": round(read.touched, 4),
     }
     return _Timed(on_grid(read.score), facts, remarks)

@@ -72,6 +72,21 @@ class HandTracks:
         return points if self.seen.all() else points[:, self.seen]
 
 
+def nobody(frames: int) -> HandTracks:
+    """The tracks of a video in which hands were not looked for, or are not.
+
+    Args:
+        frames: number of its frames.
+    """
+    return HandTracks(
+        np.zeros((frames, 2, 6, 2), np.float32),
+        np.zeros((frames, 2), bool),
+        np.zeros((frames, 2, 6), bool),
+        0,
+        0,
+    )
+
+
 def follow(
     sightings: Iterable[Iterable[Sighting]], size: tuple[int, int], plane: Plane
 ) -> HandTracks:

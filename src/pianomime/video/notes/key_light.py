@@ -23,8 +23,7 @@ ZONES = {
 }
 """Name and range of world x of each patch of a key [m]."""
 LIT = range(2)
-"""Indices of the zones in which keys light up and which hands do not hide. In the others the shade
-of a key changes when it goes down, but also when a hand is over it."""
+"""Indices of the zones in which keys light up and which hands do not hide."""
 
 _SOME = 2000
 """Frames from which the usual look of the keys is taken."""
@@ -86,6 +85,9 @@ class Glow:
     """Change of the keys from their usual look in one zone; about 0..1.
 
     It is read one key at a time, because all keys in hours of video would exceed the memory.
+
+    Attributes:
+        usual: (88, 3) usual colour of each key, 0..255.
     """
 
     def __init__(
@@ -104,20 +106,20 @@ class Glow:
         self._colourful = colourful
         # Some frames are enough for the usual look, and for the strength of changes.
         some = light.every(_step(len(light)), zone)
-        self._usual = np.asarray(np.median(some, axis=0), np.float32)
+        self.usual = np.asarray(np.median(some, axis=0), np.float32)
         # A key may be down for most of the video; without a finger near it, it is at rest.
         for key in range(KEYS):
             rest = some[away[:, key], key]
             if len(rest) >= _FEWEST:
-                self._usual[key] = np.median(rest, axis=0)
-        self._strong = max(float(np.percentile(self._change(some, self._usual), _STRONG)), 5.0)
+                self.usual[key] = np.median(rest, axis=0)
+        self._strong = max(float(np.percentile(self._change(some, self.usual), _STRONG)), 5.0)
 
     def of(self, key: int) -> NDArray[np.float32]:
         """(T,) Change of a key in every frame, about 0..1; 0 for keys that do not exist."""
         if not 0 <= key < KEYS:
             return np.zeros(len(self._light), np.float32)
         light = self._light.key(self._zone, key)
-        return self._change(light, self._usual[key]) / np.float32(self._strong)
+        return self._change(light, self.usual[key]) / np.float32(self._strong)
 
     def standing_out(self, key: int, share: float = 0.5) -> NDArray[np.float32]:
         """(T,) Change of a key, less a share of its brighter neighbour's, since light spreads.

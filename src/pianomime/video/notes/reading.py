@@ -1,4 +1,4 @@
-"""Notes read from the video itself: from keys that light up, or change their shade when pressed."""
+"""Notes read from the video itself: from keys that light up, or light above them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.music import Score
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import HandTracks
-from pianomime.video.notes.key_light import LIT, ZONES, Glow, unattended
+from pianomime.video.notes.key_light import ZONES, Glow, unattended
+from pianomime.video.notes.lit import are_lit
 from pianomime.video.notes.touch import touching
 
 _TOUCHED = np.exp(-1.0)
@@ -24,10 +25,9 @@ _LEVELS = (0.2, 0.35, 0.5)
 _SHORTEST = 2
 """Frames of the shortest note."""
 _FALSE = 2.0
-"""Cost of a note that no finger plays, relative to the value of one that a finger plays."""
-_DOUBT = 1.4
-"""Factor by which notes read from keys that go down must be more than those from keys that light
-up to be preferred."""
+"""Cost of a note that is no light or that no finger plays, relative to the value of another."""
+_FEWEST = 3
+"""Least number of notes of a film whose keys light up."""
 _VELOCITY = 80
 """Velocity of all notes; it cannot be read."""
 
@@ -36,44 +36,80 @@ class ReadNotes(NamedTuple):
     """Notes read from a video.
 
     Attributes:
-        score: the notes, without pedal.
-        touched: share of the notes with a finger on their key.
-        lit: True if their keys light up; False if they only go down, and many are missed.
+        score: the notes, without pedal; none if keys do not light up.
+        touched: share of the notes with a finger on their key; 1 if there are no hands.
+        lit: whether keys light up in this film.
+        confidence: how sure that is, 0..1: the share of what changes on the keys that is light, if
+            keys light up; else one less the greatest such share.
     """
 
     score: Score
     touched: float
     lit: bool
+    confidence: float
+
+
+class _Found(NamedTuple):
+    """What changes on the keys, seen in one way: in a zone, by a measure, above a level.
+
+    Attributes:
+        notes: (N, 3) as `_runs` returns them.
+        lit: (N,) bool, those that are light.
+        good: (N,) bool, those that are light and have a finger on their key.
+        value: number of good notes, less the cost of the others.
+    """
+
+    notes: NDArray[np.int64]
+    lit: NDArray[np.bool_]
+    good: NDArray[np.bool_]
+    value: float
+
+    @property
+    def share(self) -> float:
+        """Share of the notes that are good."""
+        return float(self.good.sum()) / max(len(self.notes), _FEWEST)
+
+
+_NOTHING = _Found(np.zeros((0, 3), np.int64), np.zeros(0, bool), np.zeros(0, bool), 0.0)
 
 
 def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
-    """Read the notes that agree best with the fingers.
+    """Read the notes that are most like light, and agree best with the fingers.
 
     All combinations of a patch of the keys, a measure of its change and a threshold are tried. The
-    one with the most notes under a finger, less those that no finger can have played, is used.
+    one with the most notes that are light and under a finger, less those that are not, is used. If
+    in all of them most are not, keys do not light up.
 
     Args:
         light: colours of the keys in each frame, see `KeyLight`.
-        tracks: the tracked hands.
+        tracks: the tracked hands; where there are none at all, notes need no finger.
         title: title of the score.
     """
     points, away = tracks.seen_points(), unattended(tracks)
-    near = np.empty((KEYS, len(points)), bool)
-    for key in range(KEYS):
-        near[key] = touching(points, key) > _TOUCHED
-    best: tuple[float, NDArray[np.int64], bool] = (0.0, np.zeros((0, 3), np.int64), True)
-    for zone, colourful, share in product(range(len(ZONES)), (True, False), _SHARES):
+    near = np.ones((KEYS, len(points)), bool)
+    hands = bool(tracks.seen.any())
+    if hands:
+        for key in range(KEYS):
+            near[key] = touching(points, key) > _TOUCHED
+    # Where no finger vouches for a note, its colour must.
+    measures = (True, False) if hands else (True,)
+    best, surest = _NOTHING, _NOTHING
+    for zone, colourful, share in product(range(len(ZONES)), measures, _SHARES):
         glow = Glow(light, away, zone, colourful)
-        for notes in _runs(glow, share):
-            value = _value(notes, near)
-            if zone not in LIT:
-                # Hands and their shadows change the look of a key as much as pressing it does.
-                notes = notes[_touched(notes, near)]
-                value /= _DOUBT
-            if value > best[0]:
-                best = value, notes, zone in LIT
-    notes = best[1]
-    touched = _touched(notes, near)
+        runs = _runs(glow, share)
+        for level, notes in enumerate(runs):
+            lit = are_lit(light, zone, glow.usual, notes, points)
+            good = lit & _touched(notes, near)
+            value = _value(notes, good, len(points))
+            if not hands:
+                value -= _FALSE * _fickle(runs, level)
+            found = _Found(notes, lit, good, value)
+            if found.value > best.value and good.sum() >= _FEWEST:
+                best = found
+            if found.share > surest.share:
+                surest = found
+    lights = best is not _NOTHING
+    notes = best.notes[best.lit]
     score = Score(
         key=notes[:, 0],
         onset=notes[:, 1] / FRAME_RATE,
@@ -81,7 +117,8 @@ def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
         velocity=np.full(len(notes), _VELOCITY),
         title=title,
     )
-    return ReadNotes(score, float(touched.mean()) if len(notes) else 0.0, best[2])
+    touched = float(_touched(notes, near).mean()) if lights else 0.0
+    return ReadNotes(score, touched, lights, best.share if lights else 1 - surest.share)
 
 
 def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:
@@ -123,12 +160,26 @@ def _touched(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> NDArray[np.bo
     return np.asarray(np.any([near[key, frame] for frame in around], axis=0))
 
 
-def _value(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> float:
-    """Number of notes under a finger, less the cost of the others and of spilt light."""
-    touched = _touched(notes, near)
+def _value(notes: NDArray[np.int64], good: NDArray[np.bool_], frames: int) -> float:
+    """Number of good notes, less the cost of the others and of spilt light.
+
+    Args:
+        notes: (N, 3) as `_runs` returns them.
+        good: (N,) bool.
+        frames: length of the video.
+    """
     # Light that spills over to a neighbour looks like a second note beside the first one. Keys
     # are further apart than the video is long, so that a frame more or less is the same key.
-    beside = near.shape[1] + 2
+    beside = frames + 2
     at = notes[:, 0] * beside + notes[:, 1]
     spilt = sum(int(np.isin(at + beside + late, at).sum()) for late in (-1, 0, 1))
-    return float(touched.sum() - _FALSE * (~touched).sum() - _FALSE * spilt)
+    return float(good.sum() - _FALSE * (~good).sum() - _FALSE * spilt)
+
+
+def _fickle(runs: list[NDArray[np.int64]], level: int) -> int:
+    """Number of notes more or fewer at the level beside this one that is most like it.
+
+    A light that is on or off is the same at every level; what spills over from others is not.
+    """
+    beside = [each for each in (level - 1, level + 1) if 0 <= each < len(runs)]
+    return min(abs(len(runs[level]) - len(runs[each])) for each in beside)
