@@ -55,6 +55,7 @@ ALLOWED = {
     ("music/protocol.py", "offset_least: float = 0.050"),
     ("music/protocol.py", "pedal: float = 0.050"),
     ("songs/notation.py", "RELEASE = 0.05"),
+    ("media/sound.py", "_JITTER = 0.05"),
     ("track/note_cost.py", "_OPEN = 0.05"),
     ("commands/progress.py", "_LINE_SECONDS = 30.0"),
     ("evaluation/robust_grid.py", "Perturbation(delay=0.05)"),
@@ -74,7 +75,6 @@ ALLOWED = {
     # Addresses of a synthesizer, the quality of a film, a share of a second.
     ("music/midi_channels.py", "part, 0x15, mode"),
     ("mp4.py", "crf: int = 20"),
-    ("video/film/sound.py", "_JITTER = SAMPLE_RATE // 20"),
     ("learn/fingers/training.py", "_CHECKPOINT_UPDATES = 20"),
     ("policies/methods.py", "Sampler(20)"),
     ("video/film/film.py", "_USUAL_RATE = 30.0"),

@@ -19,6 +19,7 @@ ROOMS = (
     ),
     ("file_names", "staging", "schema", "seal"),
     ("files", "archive", "local_server", "mp4", "sealed_json", "validation", "web_page", "workers"),
+    ("media",),
     ("music",),
     ("songs",),
     ("world",),

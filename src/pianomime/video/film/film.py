@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.media.opening import open_media, pictures_of
 from pianomime.short_repr import short_repr
-from pianomime.video.film.media import open_media
 from pianomime.video.film.read_ahead import ahead
 
 _WIDEST = 1280
@@ -191,15 +191,10 @@ class Film:
     def _open(self) -> Iterator[tuple[Any, Any]]:
         """The open file, and its stream of pictures."""
         with open_media(self.path) as container:
-            pictures = [
-                stream
-                for stream in container.streams.video
-                # A cover picture is a video stream of one picture.
-                if not (getattr(stream, "disposition", 0) & av.stream.Disposition.attached_pic)
-            ]
-            if not pictures:
+            pictures = pictures_of(container)
+            if pictures is None:
                 raise InputError(f"{self.path}: has no pictures; a video of a keyboard is needed")
-            yield container, pictures[0]
+            yield container, pictures
 
     def _decode(self, container: Any, stream: Any) -> Iterator[Any]:
         try:

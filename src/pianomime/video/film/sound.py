@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.media.opening import open_media
+from pianomime.media.sound import steady_sound
 from pianomime.music.sound import SAMPLE_RATE
 from pianomime.video.film.film import Film
-from pianomime.video.film.media import open_media
-
-_JITTER = SAMPLE_RATE // 20
-"""[samples] Smaller gaps and overlaps in a file's times are those of rounding."""
 
 
 @contextmanager
@@ -34,8 +29,10 @@ def film_sound(film: Film) -> Iterator[Callable[[int], NDArray[np.float32]] | No
         InputError: the file cannot be opened any more.
     """
     with open_media(film.path) as container:
-        streams = container.streams.audio
-        yield _reader(_steady(film, container, streams[0])) if streams else None
+        if container.streams.audio:
+            yield _reader(steady_sound(film.path, container, SAMPLE_RATE, "stereo", film.start))
+        else:
+            yield None
 
 
 def _reader(blocks: Iterator[NDArray[np.float32]]) -> Callable[[int], NDArray[np.float32]]:
@@ -49,33 +46,3 @@ def _reader(blocks: Iterator[NDArray[np.float32]]) -> Callable[[int], NDArray[np
         return piece
 
     return read
-
-
-def _steady(film: Film, container: Any, stream: Any) -> Iterator[NDArray[np.float32]]:
-    """Blocks of sound without gaps between them, the first at the first picture."""
-    done = 0
-    for seconds, block in _decoded(film, container, stream):
-        begin = done if seconds is None else round((seconds - film.start) * SAMPLE_RATE)
-        while begin - done > _JITTER:
-            gap = min(begin - done, SAMPLE_RATE)
-            yield np.zeros((gap, 2), np.float32)
-            done += gap
-        if done - begin > _JITTER:
-            block = block[done - begin :]
-        yield block
-        done += len(block)
-
-
-def _decoded(
-    film: Film, container: Any, stream: Any
-) -> Iterator[tuple[float | None, NDArray[np.float32]]]:
-    """Time in the file [s] and samples of each block; a damaged end is left out."""
-    resampler = av.AudioResampler("fltp", "stereo", SAMPLE_RATE)
-    try:
-        for frame in container.decode(stream):
-            for piece in resampler.resample(frame):
-                yield piece.time, np.asarray(piece.to_ndarray().T, np.float32)
-        for piece in resampler.resample(None):
-            yield piece.time, np.asarray(piece.to_ndarray().T, np.float32)
-    except (av.error.FFmpegError, ValueError) as error:
-        warnings.warn(f"{film.path}: its sound cannot be read to its end ({error})", stacklevel=2)
