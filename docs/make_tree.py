@@ -15,8 +15,9 @@ PAGE = ROOT / "docs" / "architecture.md"
 BLOCK = re.compile(r"^```\w*\nsrc/pianomime/.*?^```\n", re.M | re.S)
 # Rooms from the ground up; other files come first, by name.
 ORDER = (
-    "media", "music", "songs", "world", "plan", "track", "policies", "players", "export", "video",
-    "learn", "evaluation", "replay", "report", "stage", "commands", "cli.py",
+    "media", "music", "songs", "world", "plan", "track", "policies", "players", "export",
+    "transcription", "video", "learn", "evaluation", "replay", "report", "stage", "commands",
+    "cli.py",
     "film", "keyboard", "hands", "notes",
     "runs", "envs", "expert", "data", "goal", "imitation", "fingers", "sac",
 )  # fmt: skip

@@ -28,6 +28,7 @@ ROOMS = (
     ("policies",),
     ("players",),
     ("export",),
+    ("transcription",),
     ("video",),
     ("learn",),
     ("evaluation",),
@@ -61,6 +62,8 @@ VIDEO = (
 
 LEARN_ONLY = ("torch", "stable_baselines3", "diffusers", "accelerate", "gymnasium", "ray")
 """Libraries that only learn/ imports."""
+LISTENER = ("pianomime.transcription.transkun", "torch")
+"""The one file elsewhere that imports one of them, and is imported when it is needed."""
 
 
 @cache
@@ -130,7 +133,8 @@ def test_libraries_of_training_are_imported_in_learn_alone(library: str) -> None
     if library not in graph().modules:
         pytest.skip(f"nothing imports {library}")
     for name in graph().find_modules_that_directly_import(library):
-        assert f"{name}.".startswith("pianomime.learn."), f"{name} imports {library}"
+        allowed = f"{name}.".startswith("pianomime.learn.") or (name, library) == LISTENER
+        assert allowed, f"{name} imports {library}"
 
 
 def test_rooms_have_at_most_twelve_files() -> None:

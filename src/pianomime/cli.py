@@ -78,6 +78,9 @@ COMMANDS = {
     "export": Command(
         "pianomime.commands.export", "Export", "write a performance for a real robot"
     ),
+    "transcribe": Command(
+        "pianomime.commands.transcribe", "Transcribe", "write down the notes of a recording"
+    ),
     "retarget": Command(
         "pianomime.commands.retarget", "Retarget", "make a demonstration of a video"
     ),

@@ -15,6 +15,7 @@ from pianomime.world_names import WorldName
 if TYPE_CHECKING:
     from pianomime.music import Score
     from pianomime.players import Player
+    from pianomime.players.casting import Casting
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ class Play:
     Examples:
       pianomime play ode-to-joy
       pianomime play SONG.mid -o out/song --video
+      pianomime play SONG.mp3
       pianomime play SONG.mid --effort 3
       pianomime play SONG.mid --start 60 --seconds 180
       pianomime play SONG.mid --lead-in 0
@@ -49,8 +51,9 @@ class Play:
     """
 
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
-    """A MIDI file, a demonstration (see `pianomime retarget`), or the name of a bundled song (see
-    `pianomime songs`)."""
+    """A MIDI file, a demonstration (see `pianomime retarget`), a recording of a piano, which is
+    transcribed first (see `pianomime transcribe`), or the name of a bundled song (see `pianomime
+    songs`)."""
     out: Annotated[
         Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
     ] = None
@@ -88,21 +91,30 @@ class Play:
             OSError: a file cannot be read or written.
         """
         from pianomime.file_names import file_name
+        from pianomime.songs.find import find_recording, find_song
 
-        player, score, name = self._load()
-        out = self.out or Path("out", file_name(name))
+        recording = find_recording(self.song)
+        path = recording or find_song(self.song)
+        casting = self._casting(path)
+        out = self.out or Path("out", file_name(path.stem))
+        if recording is not None:
+            # Before the long work.
+            casting.check_kind(path)
+            path = _transcribed(recording, out)
+        player, score = self._cast(casting, path)
         make_report(lambda progress: player.play(score, progress), out, self.video)
 
-    def _load(self) -> tuple[Player, Score, str]:
-        """Who plays what, and the name of its file."""
-        from pianomime.errors import InputError
+    def _casting(self, path: Path) -> Casting:
+        """Who plays, before the file is read."""
         from pianomime.players.casting import Casting
-        from pianomime.songs.find import find_song
 
-        path = find_song(self.song)
-        shown = path.suffix == ".npz"
-        name = self.player or ("demonstration" if shown else "zero-shot")
-        casting = Casting.of(name, self.effort, self.seed, self.world, **self.settings)
+        name = self.player or ("demonstration" if path.suffix == ".npz" else "zero-shot")
+        return Casting.of(name, self.effort, self.seed, self.world, **self.settings)
+
+    def _cast(self, casting: Casting, path: Path) -> tuple[Player, Score]:
+        """Who plays what."""
+        from pianomime.errors import InputError
+
         lead_in = self.lead_in
         if lead_in is None:
             lead_in = LEAD_IN_SECONDS if casting.takes_lead_in else 0.0
@@ -114,7 +126,17 @@ class Play:
                 given, default = getattr(self, option), getattr(Play, option)
                 if given not in (default, value):
                     raise InputError(
-                        f"--{option} {given:g}: {name} plays the excerpt that it was trained on, "
-                        f"as it does: --{option} {value:g}"
+                        f"--{option} {given:g}: {casting.source} plays the excerpt that it was "
+                        f"trained on, as it does: --{option} {value:g}"
                     )
-        return player, score, path.stem
+        return player, score
+
+
+def _transcribed(recording: Path, out: Path) -> Path:
+    """The transcription of a recording, beside the report."""
+    from pianomime.commands.transcribe import write_transcription
+    from pianomime.file_names import file_name
+
+    midi = out / f"{file_name(recording.stem)}-transcribed.mid"
+    write_transcription(recording, midi)
+    return midi

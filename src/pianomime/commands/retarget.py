@@ -24,19 +24,25 @@ class Retarget:
       pianomime retarget VIDEO.mp4 --midi SONG.mid
       pianomime retarget VIDEO.mp4 --midi SONG.mid --points POINTS.json
       pianomime retarget VIDEO.mp4 --midi SONG.mid --offset -3.2
+      pianomime retarget VIDEO.mp4 --notes sound
       pianomime retarget VIDEO.mp4 -o DEMO.npz --no-overlay
     """
 
     video: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="VIDEO")]
     """A video of a keyboard from above."""
     midi: Annotated[Path | None, tyro.conf.arg(metavar="SONG.mid", help_behavior_hint="")] = None
-    """MIDI file of what is played; by default the notes are read from keys that light up."""
+    """MIDI file of what is played; by default the notes are taken from the video."""
+    notes: Literal["auto", "midi", "light", "sound"] = "auto"
+    """What the notes are taken from: the MIDI file, keys that light up or go down, or the sound of
+    the video. By default the MIDI file if there is one, else light where keys light up, else sound
+    where the extra `audio` is installed."""
     points: Annotated[Path | None, tyro.conf.arg(metavar="POINTS.json", help_behavior_hint="")] = (
         None
     )
     """Points of the keyboard from `pianomime pick`; by default it is found automatically."""
     offset: Annotated[float | None, tyro.conf.arg(metavar="S", help_behavior_hint="")] = None
-    """When the MIDI file begins in the video [s], negative if before it; by default estimated."""
+    """When the MIDI file begins in the video [s], negative if before it; or how late its own sound
+    is. By default estimated."""
     hand_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """MediaPipe's hand_landmarker.task; by default downloaded once."""
     align: Literal["steady", "paper"] = "steady"
@@ -78,7 +84,9 @@ class Retarget:
         ours = {file.name for file in (out, overlay, page)}
         if self.video.resolve() in (overlay.resolve(), page.resolve(), out.resolve()):
             raise InputError(f"{self.video}: would be overwritten; give OUT another name")
-        config = RetargetConfig(self.midi, self.points, self.offset, self.hand_model, self.align)
+        config = RetargetConfig(
+            self.midi, self.points, self.offset, self.hand_model, self.align, self.notes
+        )
         # The folder first: if it cannot be written, this fails before the work, not after. All
         # files appear together, so that an interruption leaves no page without its demonstration.
         with staged(out.parent, ours, out.name) as folder, bars() as progress:
@@ -91,6 +99,7 @@ class Retarget:
         print(f"keyboard: {quality['keyboard']}")
         print(f"both hands seen in {quality['both_hands_found']:.1%} of the frames")
         print(f"notes: {quality['notes']}, fingers guessed: {quality['notes_guessed']}")
+        print(f"notes are from: {shown(quality['notes_from'])}")
         for remark in made.remarks[:_REMARKS]:
             print(f"note: {shown(remark)}")
         if len(made.remarks) > _REMARKS:

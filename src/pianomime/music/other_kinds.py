@@ -14,11 +14,11 @@ _GUITAR_PRO = (".gp", ".gp3", ".gp4", ".gp5", ".gpx", ".gtp")
 _PICTURE = (".pdf", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
 
 _MUSIC = {
-    **dict.fromkeys(_SOUND, "sound must be transcribed to MIDI first, by a tool like basic-pitch"),
+    **dict.fromkeys(_SOUND, "`pianomime transcribe {file}` makes MIDI of a recording of a piano"),
     **dict.fromkeys(
         _VIDEO,
         "`pianomime retarget {file}` makes a demonstration of a video of a person who plays, "
-        "filmed from above",
+        "filmed from above, and `pianomime transcribe {file}` makes MIDI of its sound",
     ),
     **dict.fromkeys(
         _MUSESCORE + _GUITAR_PRO,
@@ -51,6 +51,11 @@ def advice(path: Path) -> str:
     text = _ADVICE.get(path.suffix.lower(), "")
     # The MIDI file is named without its folder: it may be one that cannot be written.
     return text.format(file=command_word(path), midi=command_word(f"{path.stem}.mid"))
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file is sound or a video by its suffix, upper and lower case alike."""
+    return path.suffix.lower() in (*_SOUND, *_VIDEO)
 
 
 def is_music(path: Path) -> bool:

@@ -73,6 +73,20 @@ class Casting:
         """Whether the player plays files of this kind."""
         return self.player is not None or path.suffix == _SUFFIX
 
+    def check_kind(self, path: Path) -> None:
+        """Refuse a file of a kind that the player does not play.
+
+        Args:
+            path: its suffix decides.
+
+        Raises:
+            DemonstrationNeededError: it is no demonstration, and the player needs one.
+        """
+        if not self.can_play(path):
+            raise DemonstrationNeededError(
+                f"{path}: {self.source} plays demonstrations (.npz), not MIDI files"
+            )
+
     @property
     def takes_lead_in(self) -> bool:
         """Whether the player can begin with silence: no expert can, and no demonstration's plan."""
@@ -119,10 +133,7 @@ class Casting:
         self.check_lead_in(lead_in)
         if self.player is not None and self.player.excerpt is not None:
             start, seconds = self.player.excerpt
-        if not self.can_play(path):
-            raise DemonstrationNeededError(
-                f"{path}: {self.source} plays demonstrations (.npz), not MIDI files"
-            )
+        self.check_kind(path)
         if path.suffix != _SUFFIX:
             assert self.player is not None
             return self.player, excerpt(Score.from_midi(path), start, seconds, lead_in)

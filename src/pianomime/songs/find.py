@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pianomime import songs
 from pianomime.errors import InputError, UnknownNameError, closest
-from pianomime.music.other_kinds import advice, is_music
+from pianomime.music.other_kinds import advice, is_music, is_recording
 
 MIDI_SUFFIXES = (".mid", ".midi", ".kar", ".rmi", ".rmid", ".smf")
 """Ends of the names of MIDI files, in lower case: of karaoke and in RIFF wrappers, too."""
@@ -50,6 +50,16 @@ def find_song(name: str) -> Path:
     raise UnknownNameError(
         f"{name}: no such file or bundled song{hint} bundled are: {', '.join(songs.names())}"
     )
+
+
+def find_recording(name: str) -> Path | None:
+    """The recording of a name: a file of sound or a video; None if it is something else.
+
+    Args:
+        name: as `find_song` has it.
+    """
+    path = Path(name)
+    return path if path.is_file() and is_recording(path) and not _begins_as_midi(path) else None
 
 
 def _begins_as_midi(path: Path) -> bool:

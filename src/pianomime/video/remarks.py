@@ -110,6 +110,20 @@ def on_keyboard(light: LightRecord) -> list[str]:
     ]
 
 
+def on_sound(offset: Offset) -> list[str]:
+    """Remarks on how the sound of a video fits its pictures.
+
+    Args:
+        offset: where its notes lie in the video.
+    """
+    if offset.matches:
+        return []
+    return [
+        f"the sound may not be of what is seen: {offset.touched:.0%} of its notes have a finger on "
+        f"their key, {offset.by_chance:.0%} would by chance"
+    ]
+
+
 def on_midi(midi: str, score: Score, offset: Offset, seconds: float) -> list[str]:
     """Remarks on how a MIDI file fits a video.
 

@@ -6,9 +6,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 from pianomime.errors import InputError
+from pianomime.installation import install_command
 from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
 from pianomime.music.score import MAX_SECONDS
@@ -16,6 +17,9 @@ from pianomime.plan import LEFT, RIGHT
 from pianomime.plan.demonstration import Demonstration, on_grid
 from pianomime.progress import Progress, no_progress
 from pianomime.shown import shown, title_of
+from pianomime.transcription.listener import Listener, can_listen, check_listener
+from pianomime.transcription.recording import Recording
+from pianomime.transcription.transcribe import transcribe
 from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
 from pianomime.video.film.background import background
@@ -31,7 +35,7 @@ from pianomime.video.keyboard.points import NamedPoints, read_points
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.offset import Offset, estimate_offset
-from pianomime.video.notes.reading import read_notes
+from pianomime.video.notes.reading import ReadNotes, read_notes
 from pianomime.video.parallax import correct_parallax
 
 _MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
@@ -42,6 +46,11 @@ _FEW_TOUCHED = 0.7
 """Share of notes with a finger on their key below which notes read from a video are doubtful."""
 _BETTER = 0.02
 """Share of notes by which a less likely octave must have more fingers on keys to be chosen."""
+_LATE_SOUND = 0.5
+"""[s] Most by which the sound of a video is before or after its pictures."""
+
+Notes = Literal["auto", "midi", "light", "sound"]
+"""What the notes are taken from, see `RetargetConfig.notes`."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +58,20 @@ class RetargetConfig:
     """What is known about a video, and how to make a demonstration of it."""
 
     midi: Path | None = None
-    """MIDI file of what is played; by default the notes are read from the video."""
+    """MIDI file of what is played; by default the notes are taken from the video."""
     points: Path | None = None
     """JSON file of named points of the keyboard; by default the keyboard is found automatically."""
     offset: float | None = None
-    """Time in the video at which the MIDI file begins [s]; by default it is estimated."""
+    """Time in the video at which the MIDI file begins, or by which its own sound is late [s]; by
+    default it is estimated."""
     hand_model: Path | None = None
     """MediaPipe's hand_landmarker.task; by default it is downloaded once."""
     align: Rule = "steady"
     """How fingertips are moved onto the keys they press, see `align`."""
+    notes: Notes = "auto"
+    """What the notes are taken from: `midi`; `light`, that is, keys that light up; or the `sound`
+    of the video. `auto` is the MIDI file if there is one, else light where keys light up, else
+    sound where the extra `audio` is installed and a piano is heard."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,20 +96,27 @@ class Retargeted:
 
 
 def retarget(
-    video: Path, config: RetargetConfig | None = None, progress: Progress = no_progress
+    video: Path,
+    config: RetargetConfig | None = None,
+    progress: Progress = no_progress,
+    listener: Listener | None = None,
 ) -> Retargeted:
     """Make a demonstration of a video.
 
     Args:
         video: a video of a keyboard from above.
         config: what else is known.
-        progress: called in the phases "keyboard", "hands" and "notes".
+        progress: called in the phases "keyboard", "hands" and "notes", and "listening" where the
+            notes are taken from sound.
+        listener: who hears the notes; transkun if not given.
 
     Raises:
         InputError: a file cannot be used, or the video shows no keyboard or no hands.
     """
     config = config or RetargetConfig()
-    given = _Given.read(video, config)
+    given = _Given.read(video, config, listener)
+    if config.notes == "sound":
+        given = replace(given, score=given.heard(progress))
     progress("keyboard", 0, 0)
     views = _find_views(given)
     seen = _watch(given, views, progress)
@@ -129,27 +150,60 @@ def retarget(
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """The files that a user gave, read and checked."""
+    """The files that a user gave, read and checked.
+
+    Attributes:
+        config: what is known about the video.
+        film: the video.
+        score: the notes, of a MIDI file or of the sound; None if they are read from keys.
+        recording: the sound of the video, where the notes may be taken from it.
+        points: of the keyboard.
+        hand_model: MediaPipe's.
+        listener: who hears the notes of the sound; transkun if None.
+    """
 
     config: RetargetConfig
     film: Film
     score: Score | None
+    recording: Recording | None
     points: NamedPoints | None
     hand_model: Path
+    listener: Listener | None
 
     @staticmethod
-    def read(video: Path, config: RetargetConfig) -> _Given:
+    def read(video: Path, config: RetargetConfig, listener: Listener | None) -> _Given:
         """Everything that can be wrong with the files is found here, before the long work."""
         if config.offset is not None and not abs(config.offset) <= MAX_SECONDS:
             raise InputError(f"--offset must be a time in the video, not {config.offset:g} s")
+        if (config.midi is not None) != (config.notes == "midi") and config.notes != "auto":
+            missing = "needs --midi" if config.notes == "midi" else "goes without --midi"
+            raise InputError(f"--notes {config.notes} {missing}")
         # Before anything is read, and long before the hand model is downloaded for it.
         check_mediapipe()
+        if config.notes == "sound" and listener is None:
+            check_listener()
         points = None if config.points is None else read_points(config.points)
         score = None if config.midi is None else Score.from_midi(config.midi)
         film = Film(video)
         if film.seconds > MAX_SECONDS:
             raise InputError(f"{video}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
-        return _Given(config, film, score, points, find_hand_model(config.hand_model))
+        recording = _recording(video, config) if score is None else None
+        model = find_hand_model(config.hand_model)
+        return _Given(config, film, score, recording, points, model, listener)
+
+    @property
+    def may_listen(self) -> bool:
+        """Whether there is a sound to take the notes from, and somebody who hears them."""
+        return self.recording is not None and (self.listener is not None or can_listen())
+
+    def heard(self, progress: Progress) -> Score:
+        """The notes that are heard in the video, in the time of its pictures.
+
+        Raises:
+            InputError: no notes are heard.
+        """
+        assert self.recording is not None
+        return transcribe(self.recording, self.listener, progress)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -160,6 +214,22 @@ class _Given:
         )
 
 
+def _recording(video: Path, config: RetargetConfig) -> Recording | None:
+    """The sound of the video, where it is wanted.
+
+    Raises:
+        InputError: there is none, and nothing else is wanted.
+    """
+    if config.notes == "light":
+        return None
+    try:
+        return Recording.of(video)
+    except InputError:
+        if config.notes == "sound":
+            raise
+        return None
+
+
 @dataclass(frozen=True, eq=False)
 class _View:
     """A way to see the keyboard in the video: its plane, and a line for the user.
@@ -167,7 +237,7 @@ class _View:
     Attributes:
         plane: from pixels of the pictures as they are read to the world.
         description: one line.
-        only_guess: the keyboard, where its octave is open and no MIDI file decides.
+        only_guess: the keyboard, where its octave is open and only notes can decide it.
     """
 
     plane: Plane
@@ -182,6 +252,22 @@ class _Timed:
     score: Score
     facts: dict[str, Any]
     remarks: list[str]
+
+
+class _Taken(NamedTuple):
+    """The notes, the view in which they fit the video, and the hands in it.
+
+    Attributes:
+        view: number of the view.
+        tracks: the tracked hands.
+        timed: the notes.
+        guess: the keyboard, where nothing decided its octave.
+    """
+
+    view: int
+    tracks: HandTracks
+    timed: _Timed
+    guess: Keyboard | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,12 +290,15 @@ def _find_views(given: _Given) -> list[_View]:
         raise InputError(
             f"{film.path}: no keyboard found; mark where it is with `pianomime pick {film.path}`"
         )
-    if given.score is None:
+    if given.score is None and not given.may_listen:
         # Only notes can decide the octave, so the likeliest one is assumed.
         open_octave = len(keyboards) > 1
         likeliest = keyboards[0]
         return [_View(likeliest.plane, likeliest.describe(), likeliest if open_octave else None)]
-    return [_View(keyboard.plane, keyboard.describe()) for keyboard in keyboards]
+    return [
+        _View(keyboard.plane, keyboard.describe(), keyboard if len(keyboards) > 1 else None)
+        for keyboard in keyboards
+    ]
 
 
 def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
@@ -218,20 +307,17 @@ def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
         lights = [records.enter_context(LightRecord(len(ZONES))) for _ in views]
         sightings = _detect(given, views, lights, progress)
         progress("notes", 0, 0)
-        best, tracks, offset = _best_view(given, views, sightings, lights)
+        if given.score is None:
+            taken = _from_video(given, views, sightings, lights, progress)
+        else:
+            taken = _from_score(given, given.score, views, sightings, lights)
         del sightings  # in hours of video, they take much memory
-        view, light = views[best], lights[best]
-        if not tracks.seen.any():
-            raise InputError(f"{given.film.path}: no hands are seen playing")
-        remarks = [] if view.only_guess is None else [remark.on_octave(view.only_guess)]
+        view, light, tracks = views[taken.view], lights[taken.view], taken.tracks
+        remarks = [] if taken.guess is None else [remark.on_octave(taken.guess)]
         remarks += [*remark.on_missing_hands(tracks), *remark.on_keyboard(light)]
         if len(tracks) == _MOST_FRAMES:
             remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
-        if given.score is None or offset is None:
-            timed = _read_score(given.film, tracks, light)
-        else:
-            timed = _place_midi(given, given.score, offset, len(tracks) / FRAME_RATE)
-    return _Seen(view, tracks, timed, remarks)
+    return _Seen(view, tracks, taken.timed, remarks)
 
 
 def _detect(
@@ -251,32 +337,62 @@ def _detect(
     return sightings
 
 
-def _best_view(
-    given: _Given, views: list[_View], sightings: Sightings, lights: list[LightRecord]
-) -> tuple[int, HandTracks, Offset | None]:
-    """The view in which most notes of the MIDI file, if there is one, have a finger on them."""
-    best: tuple[int, HandTracks, Offset | None] | None = None
+def _from_score(
+    given: _Given,
+    score: Score,
+    views: list[_View],
+    sightings: Sightings,
+    lights: list[LightRecord],
+) -> _Taken:
+    """The notes of a MIDI file or of the sound, in the view in which most have a finger on them."""
+    best: tuple[int, HandTracks, Offset] | None = None
+    most = np.inf if given.config.midi is not None else _LATE_SOUND
     for number, (view, light) in enumerate(zip(views, lights, strict=True)):
         tracks = follow(sightings, given.size, view.plane)
-        if given.score is None:
-            return number, tracks, None
-        offset = estimate_offset(given.score, tracks, light, given.config.offset)
-        if best is None or best[2] is None or offset.touched > best[2].touched + _BETTER:
+        offset = estimate_offset(score, tracks, light, given.config.offset, most)
+        if best is None or offset.touched > best[2].touched + _BETTER:
             best = number, tracks, offset
     assert best is not None
-    return best
+    number, tracks, offset = best
+    _check_hands(given, tracks)
+    return _Taken(number, tracks, _place(given, score, offset, len(tracks) / FRAME_RATE))
 
 
-def _read_score(film: Film, tracks: HandTracks, light: LightRecord) -> _Timed:
-    """The score read from the video itself."""
-    read = read_notes(light, tracks, title_of(film.path))
-    if not read.lit:
-        raise InputError(
-            f"{film.path}: keys do not light up in this film (confidence {read.confidence:.0%}), "
-            "so it does not show what is played: give that with --midi FILE, which may also be "
-            "transcribed from the film's sound (with --notes sound, where `pianomime retarget "
-            "--help` lists it)"
-        )
+def _from_video(
+    given: _Given,
+    views: list[_View],
+    sightings: Sightings,
+    lights: list[LightRecord],
+    progress: Progress,
+) -> _Taken:
+    """The notes of keys that light up, or else of the sound."""
+    view = views[0]
+    tracks = follow(sightings, given.size, view.plane)
+    _check_hands(given, tracks)
+    read = read_notes(lights[0], tracks, title_of(given.film.path))
+    if read.lit:
+        return _Taken(0, tracks, _read_score(read), view.only_guess)
+    advice = "give that with --midi FILE"
+    if given.may_listen:
+        try:
+            return _from_score(given, given.heard(progress), views, sightings, lights)
+        except InputError as error:
+            advice += f" (its sound is of no help: {error})"
+    elif given.recording is not None:
+        advice += f", or have its sound transcribed ({install_command('audio')})"
+    raise InputError(
+        f"{given.film.path}: keys do not light up in this film (confidence "
+        f"{read.confidence:.0%}), so it does not show what is played: {advice}"
+    )
+
+
+def _check_hands(given: _Given, tracks: HandTracks) -> None:
+    if not tracks.seen.any():
+        raise InputError(f"{given.film.path}: no hands are seen playing")
+
+
+def _read_score(read: ReadNotes) -> _Timed:
+    """The score read from keys that light up."""
     remarks = []
     if read.touched < _FEW_TOUCHED:
         remarks.append(
@@ -291,18 +407,22 @@ def _read_score(film: Film, tracks: HandTracks, light: LightRecord) -> _Timed:
     return _Timed(on_grid(read.score), facts, remarks)
 
 
-def _place_midi(given: _Given, score: Score, offset: Offset, seconds: float) -> _Timed:
-    """The MIDI file's score in the time of a video of `seconds`."""
+def _place(given: _Given, score: Score, offset: Offset, seconds: float) -> _Timed:
+    """The score of the MIDI file, or else of the sound, in the time of a video of `seconds`."""
     midi, film = given.config.midi, given.film.path
     if given.config.offset is None and offset.touched < _TOO_FEW_TOUCHED:
-        raise InputError(
-            f"{midi} is not what is played in {film}: at best {offset.touched:.0%} of its notes "
-            "have a finger on their key (give --offset to go on anyway)"
+        other = (
+            f"{film}: its sound is not of what is seen"
+            if midi is None
+            else f"{midi} is not what is played in {film}"
         )
-    remarks = remark.on_midi(str(midi), score, offset, seconds)
+        raise InputError(
+            f"{other}: at best {offset.touched:.0%} of its notes have a finger on their key (give "
+            "--offset to go on anyway)"
+        )
     begin, end = -offset.seconds, seconds - offset.seconds
     if end <= score.onset[0] or begin >= score.duration:
-        raise InputError(f"{midi}: no note falls within {film} at this offset")
+        raise InputError(f"{midi or film}: no note falls within {film} at this offset")
     if begin > 0:
         timed = score.clip(begin, end)
     else:
@@ -311,11 +431,15 @@ def _place_midi(given: _Given, score: Score, offset: Offset, seconds: float) -> 
             cut, onset=cut.onset - begin, offset=cut.offset - begin, pedal=cut.pedal - begin
         )
     facts = {
-        "notes_from": "" if midi is None else shown(midi.name),
+        "notes_from": "sound" if midi is None else shown(midi.name),
         "offset_seconds": round(offset.seconds, 4),
         "notes_touched": round(offset.touched, 4),
         "notes_touched_by_chance": round(offset.by_chance, 4),
     }
+    if midi is None:
+        remarks = [*score.remarks, *remark.on_sound(offset)]
+    else:
+        remarks = remark.on_midi(str(midi), score, offset, seconds)
     return _Timed(on_grid(timed), facts, remarks)
 
 

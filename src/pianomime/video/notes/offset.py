@@ -47,7 +47,11 @@ class Offset:
 
 
 def estimate_offset(
-    score: Score, tracks: HandTracks, light: LightRecord, given: float | None = None
+    score: Score,
+    tracks: HandTracks,
+    light: LightRecord,
+    given: float | None = None,
+    most: float = np.inf,
 ) -> Offset:
     """Find the offset at which the score fits the video best.
 
@@ -56,6 +60,7 @@ def estimate_offset(
         tracks: the tracked hands.
         light: colours of the keys in each frame, see `KeyLight`.
         given: the offset [s], if it is known; then only its fit is measured.
+        most: how far from 0 it may be [s].
     """
     points, away = tracks.seen_points(), unattended(tracks)
     onset = np.floor(score.onset * FRAME_RATE + 0.5).astype(np.int64)
@@ -85,7 +90,9 @@ def estimate_offset(
     possible = (together >= _INSIDE * min(length, len(points))) & (counts > 0)
     # Music repeats itself, so a good fit of many notes is better evidence than one of few.
     sure = (total - np.median(total[possible])) * np.sqrt(counts)
-    at = int(np.argmax(np.where(possible, sure, -np.inf)))
+    open_lags = possible & (np.abs(lags) <= most * FRAME_RATE)
+    # Where the music is hardly in the video, no offset is better than none.
+    at = int(np.argmax(np.where(open_lags, sure, -np.inf)) if open_lags.any() else -lags[0])
     if given is None:
         seconds = (lags[at] + _vertex(total, at)) / FRAME_RATE
     else:

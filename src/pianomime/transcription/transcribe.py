@@ -1,0 +1,128 @@
+"""From a recording to a score: notes with velocities and pedal, and what is doubtful about them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pianomime.errors import InputError
+from pianomime.music.score import Score
+from pianomime.progress import Progress, no_progress
+from pianomime.shown import title_of
+from pianomime.transcription.listener import Listener, find_listener
+from pianomime.transcription.loudness import Loudness, loudness_of
+from pianomime.transcription.recording import Recording, Stretch
+
+_FEW, _RARE = 5, 0.2
+"""Notes in all, and a second, below which there are hardly any."""
+_UNEXPLAINED = 0.3
+"""Share of the loud time without a note from which something else is heard."""
+_TWICE = 0.03
+"""[s] Two strikes of a key are further apart: nearer ones are one, heard in two stretches."""
+
+
+def transcribe(
+    recording: Recording, listener: Listener | None = None, progress: Progress = no_progress
+) -> Score:
+    """Write down the notes of a recording of a piano.
+
+    Args:
+        recording: the recording.
+        listener: who hears the notes; transkun if not given.
+        progress: called in the phase "listening", with seconds.
+
+    Returns:
+        The score, in the time of the recording, with its doubts as `remarks`.
+
+    Raises:
+        InputError: the recording is silent, no notes are heard in it, or it cannot be read; or
+            transkun is not installed.
+    """
+    total = round(recording.seconds)
+    progress("listening", 0, total)
+    if listener is None:
+        listener = find_listener()
+    heard: list[Score] = []
+    loudness: list[NDArray[np.float32]] = []
+    for stretch in recording.stretches(listener.rate):
+        first, stop = stretch.own
+        loudness.append(loudness_of(stretch.samples[first:stop], listener.rate))
+        if not (loudness[-1] > 0).any():
+            continue
+        tell = _teller(progress, stretch, total)
+        heard.append(_own(listener.hear(stretch.samples, tell), stretch, listener.rate))
+    whole = Loudness(loudness)
+    if whole.silent:
+        raise InputError(f"{recording.path}: is silent")
+    score = _joined(heard, whole, title_of(recording.path))
+    if not len(score):
+        raise InputError(f"{recording.path}: no notes of a piano are heard in it")
+    return replace(score, remarks=_doubts(score, whole))
+
+
+def _teller(progress: Progress, stretch: Stretch, total: int) -> Callable[[float], None]:
+    """What takes note of how much of a stretch has been heard."""
+
+    def tell(seconds: float) -> None:
+        done = round(stretch.begin + seconds)
+        progress("listening", done, max(total, done))
+
+    return tell
+
+
+def _own(score: Score, stretch: Stretch, rate: int) -> Score:
+    """Notes and pedal that begin in what is a stretch's own, in the time of the recording."""
+    first, stop = (edge / rate for edge in stretch.own)
+
+    def begins(onset: NDArray[np.float64]) -> NDArray[np.bool_]:
+        return (onset >= first) & (onset < stop)
+
+    note, foot = begins(score.onset), begins(score.pedal[:, 0])
+    return replace(
+        score,
+        key=score.key[note],
+        onset=score.onset[note] + stretch.begin,
+        offset=score.offset[note] + stretch.begin,
+        velocity=score.velocity[note],
+        pedal=score.pedal[foot] + stretch.begin,
+    )
+
+
+def _joined(heard: list[Score], loudness: Loudness, title: str) -> Score:
+    """The notes of all stretches, without those that begin in silence or are heard twice."""
+
+    def all_of(name: str) -> NDArray[np.float64]:
+        return np.concatenate([getattr(score, name) for score in heard])
+
+    key, onset = all_of("key").astype(np.int64), all_of("onset")
+    order = np.lexsort((onset, key))
+    again = np.zeros(len(key), bool)
+    again[order[1:]] = (np.diff(key[order]) == 0) & (np.diff(onset[order]) < _TWICE)
+    kept = loudness.struck(onset) & ~again
+    return Score(
+        key[kept],
+        onset[kept],
+        all_of("offset")[kept],
+        all_of("velocity")[kept].astype(np.int64),
+        all_of("pedal"),
+        title,
+    )
+
+
+def _doubts(score: Score, loudness: Loudness) -> tuple[str, ...]:
+    """One line for each reason to doubt the score."""
+    doubts = []
+    if len(score) < max(_FEW, _RARE * loudness.seconds):
+        doubts.append(
+            f"hardly any notes are heard: {len(score)} in {loudness.seconds:.0f} s; is it a piano?"
+        )
+    share = loudness.unexplained(score)
+    if share > _UNEXPLAINED:
+        doubts.append(
+            f"in {share:.0%} of the loud time no note is heard: of voices, other instruments and "
+            "noise nothing is written down"
+        )
+    return tuple(doubts)
