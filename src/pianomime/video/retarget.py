@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -346,7 +347,7 @@ def _from_score(
 ) -> _Taken:
     """The notes of a MIDI file or of the sound, in the view in which most have a finger on them."""
     best: tuple[int, HandTracks, Offset] | None = None
-    most = np.inf if given.config.midi is not None else _LATE_SOUND
+    most = math.inf if given.config.midi is not None else _LATE_SOUND
     for number, (view, light) in enumerate(zip(views, lights, strict=True)):
         tracks = follow(sightings, given.size, view.plane)
         offset = estimate_offset(score, tracks, light, given.config.offset, most)
