@@ -22,8 +22,8 @@ _ABOUT = {
     "one-stage-diff": "diffusion, goals to controls",
     "bc-mse": "regression, goals to controls",
     "multi-task-sac": "reinforcement learning (SAC)",
-    "demonstration": "fingertips as a human's",
-    "demonstration-ik": "the same, the paper's tracker",
+    "demonstration": "a human's fingers, made feasible",
+    "demonstration-ik": "as recorded, the paper's tracker",
     "expert": "plays the song it was trained on",
 }
 """What the players are that come with the program."""

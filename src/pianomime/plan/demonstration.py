@@ -16,6 +16,7 @@ from pianomime.files import atomic
 from pianomime.keyboard import EXCERPT_SECONDS, FRAME_RATE, NO_KEY
 from pianomime.music import Score
 from pianomime.plan.fingertip_plan import FingertipPlan
+from pianomime.plan.hand_path import make_feasible
 from pianomime.plan.plan_arrays import (
     PLAN_SCHEMA,
     SCORE_SCHEMA,
@@ -180,17 +181,28 @@ class Demonstration:
 
 
 @dataclass(frozen=True)
+class DemonstrationConfig:
+    """How the plan of a demonstration is played."""
+
+    feasible: bool = True
+    """Move fingertips to where the robot's hands can be, see `make_feasible`; otherwise they are as
+    they were recorded."""
+
+
+@dataclass(frozen=True)
 class DemonstrationPlanner:
     """The planner of one score: it returns the plan of a demonstration.
 
     Attributes:
         demonstration: whose plan to return.
+        config: whether it is moved; by default it is as it was recorded, as learners need it.
     """
 
     demonstration: Demonstration
+    config: DemonstrationConfig = DemonstrationConfig(feasible=False)
 
     def plan(self, score: Score) -> FingertipPlan:
-        """Return the demonstration's plan.
+        """Return the demonstration's plan, with the same fingers on the same keys.
 
         Args:
             score: must have the same roll as the demonstration's score, or as its beginning.
@@ -207,7 +219,7 @@ class DemonstrationPlanner:
                 f"{score.title}, {score.duration:.1f} s: is not the score of the demonstration "
                 f"{shown.score.title}, {self.demonstration.score.duration:.1f} s"
             )
-        return shown.plan
+        return make_feasible(shown.plan) if self.config.feasible else shown.plan
 
 
 def is_demonstration(path: str | os.PathLike[str]) -> bool:

@@ -8,7 +8,11 @@ from typing import Any
 
 from pianomime.errors import InputError
 from pianomime.plan import ZeroShotConfig, ZeroShotPlanner
-from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
+from pianomime.plan.demonstration import (
+    Demonstration,
+    DemonstrationConfig,
+    DemonstrationPlanner,
+)
 from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.players.generalist import GeneralistPlayer
 from pianomime.players.player import PlannedPlayer, Player
@@ -132,8 +136,13 @@ def _demonstration(
     world: str = PAPER,
     **settings: Any,
 ) -> Player:
-    tracker, sampling = configure(settings, tracker=DynamicConfig(), sampling=_budget(effort, seed))
-    planner = _demonstration_planner(demonstration)
+    planning, tracker, sampling = configure(
+        settings,
+        planner=DemonstrationConfig(),
+        tracker=DynamicConfig(),
+        sampling=_budget(effort, seed),
+    )
+    planner = replace(_demonstration_planner(demonstration), config=planning)
     controls = _with_sampling(DynamicTracker(tracker, world), effort, sampling, world)
     return PlannedPlayer("demonstration", planner, controls, effort, world=world)
 
@@ -199,7 +208,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "zero-shot-ik": {"planner": ZeroShotConfig(), "tracker": IkConfig()},
     FINGERS: {"planner": ZeroShotConfig(), **_SAMPLING},
     **{method: {"sampler": SAMPLERS[1]} for method in GENERALISTS},
-    "demonstration": {"tracker": DynamicConfig(), **_SAMPLING},
+    "demonstration": {"planner": DemonstrationConfig(), "tracker": DynamicConfig(), **_SAMPLING},
     "demonstration-ik": {"tracker": IkConfig()},
 }
 """The configs whose fields are the settings of each player, by group, at effort 1 in the paper's
