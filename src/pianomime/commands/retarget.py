@@ -40,6 +40,12 @@ class Retarget:
         None
     )
     """Points of the keyboard from `pianomime pick`; by default it is found automatically."""
+    octave: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
+    """Octave of the lowest C that is seen, 4 for the middle C; by default it is found out."""
+    mirrored: tyro.conf.FlagCreatePairsOff[bool] = False
+    """The video is mirrored; by default that is found out."""
+    not_mirrored: tyro.conf.FlagCreatePairsOff[bool] = False
+    """The video is not mirrored."""
     offset: Annotated[float | None, tyro.conf.arg(metavar="S", help_behavior_hint="")] = None
     """When the MIDI file begins in the video [s], negative if before it; or how late its own sound
     is. By default estimated."""
@@ -65,6 +71,7 @@ class Retarget:
 
         # Before the other imports, which take seconds.
         check_mediapipe()
+        from pianomime.commands.mirrored import mirrored_or_not
         from pianomime.commands.progress import bars
         from pianomime.errors import InputError
         from pianomime.file_names import file_name
@@ -85,7 +92,14 @@ class Retarget:
         if self.video.resolve() in (overlay.resolve(), page.resolve(), out.resolve()):
             raise InputError(f"{self.video}: would be overwritten; give OUT another name")
         config = RetargetConfig(
-            self.midi, self.points, self.offset, self.hand_model, self.align, self.notes
+            self.midi,
+            self.points,
+            self.octave,
+            mirrored_or_not(self.mirrored, self.not_mirrored),
+            self.offset,
+            self.hand_model,
+            self.align,
+            self.notes,
         )
         # The folder first: if it cannot be written, this fails before the work, not after. All
         # files appear together, so that an interruption leaves no page without its demonstration.

@@ -58,8 +58,7 @@ def notes_of_lit_film(
                 f"`pianomime pick {film.path}`"
             )
         plane = keyboards[0].plane
-        if len(keyboards) > 1:
-            notes = (remark.on_octave(keyboards[0]),)
+        notes = tuple(remark.on_naming(keyboards))
     else:
         plane = points.plane.zoomed(1 / film.zoom)
     reader = KeyLight(plane, (round(film.width / film.zoom), round(film.height / film.zoom)))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
-from pianomime.keyboard import FRAME_RATE, key_name
+from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
 from pianomime.plan import LEFT, RIGHT, FingertipPlan
 from pianomime.video.film.light_record import LightRecord
@@ -46,17 +48,26 @@ def intervals(holds: NDArray[np.bool_]) -> list[tuple[float, float]]:
     ]
 
 
-def on_octave(keyboard: Keyboard) -> str:
-    """The remark that the video leaves the octave open.
+def on_naming(keyboards: Sequence[Keyboard]) -> list[str]:
+    """Remarks on what a picture leaves open about the names of the keys.
 
     Args:
-        keyboard: the keyboard in the octave that was assumed.
+        keyboards: the keyboard in each way to name its keys, the one that is assumed first.
     """
-    lowest = key_name(int(np.flatnonzero(keyboard.seen)[0]))
-    return (
-        f"the video leaves the octave open: its lowest key is assumed to be {lowest} "
-        "(a MIDI file would decide)"
-    )
+    assumed, *others = keyboards
+    remarks = []
+    if any(other.lowest_c != assumed.lowest_c for other in others):
+        remarks.append(
+            f"the video leaves the octave open: its lowest C is taken for C{assumed.lowest_c} "
+            "(--octave names it; a MIDI file would decide)"
+        )
+    if any(other.mirrored != assumed.mirrored for other in others):
+        remarks.append(
+            "the video may be mirrored or not: "
+            f"{'mirrored' if assumed.mirrored else 'not mirrored'} is assumed (--mirrored or "
+            "--not-mirrored tells it; a MIDI file would decide)"
+        )
+    return remarks
 
 
 def on_missing_hands(tracks: HandTracks) -> list[str]:

@@ -30,7 +30,7 @@ from pianomime.video.hands.detector import HandDetector, check_mediapipe
 from pianomime.video.hands.model import find_hand_model
 from pianomime.video.hands.sightings import Sightings
 from pianomime.video.hands.tracks import HandTracks, follow
-from pianomime.video.keyboard.keyboard import Keyboard, find_keyboards
+from pianomime.video.keyboard.keyboard import find_keyboards
 from pianomime.video.keyboard.plane import Plane
 from pianomime.video.keyboard.points import NamedPoints, read_points
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
@@ -62,6 +62,10 @@ class RetargetConfig:
     """MIDI file of what is played; by default the notes are taken from the video."""
     points: Path | None = None
     """JSON file of named points of the keyboard; by default the keyboard is found automatically."""
+    octave: int | None = None
+    """Octave of the lowest C that is seen, 4 for the middle C; by default it is found out."""
+    mirrored: bool | None = None
+    """Whether the video is mirrored; by default it is found out."""
     offset: float | None = None
     """Time in the video at which the MIDI file begins, or by which its own sound is late [s]; by
     default it is estimated."""
@@ -238,12 +242,12 @@ class _View:
     Attributes:
         plane: from pixels of the pictures as they are read to the world.
         description: one line.
-        only_guess: the keyboard, where its octave is open and only notes can decide it.
+        guessed: what the video leaves open, and notes may decide, one line each.
     """
 
     plane: Plane
     description: str
-    only_guess: Keyboard | None = None
+    guessed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,13 +266,13 @@ class _Taken(NamedTuple):
         view: number of the view.
         tracks: the tracked hands.
         timed: the notes.
-        guess: the keyboard, where nothing decided its octave.
+        guessed: what they do not decide of the keyboard, one line each.
     """
 
     view: int
     tracks: HandTracks
     timed: _Timed
-    guess: Keyboard | None = None
+    guessed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,20 +290,26 @@ def _find_views(given: _Given) -> list[_View]:
     film = given.film
     if given.points is not None:
         return [_View(given.points.plane.zoomed(1 / film.zoom), given.points.describe())]
-    keyboards = find_keyboards(background(film))
+    config = given.config
+    keyboards = find_keyboards(background(film), config.octave, config.mirrored)
     if not keyboards:
-        raise InputError(
-            f"{film.path}: no keyboard found; mark where it is with `pianomime pick {film.path}`"
-        )
+        raise InputError(f"{film.path}: {_not_found(config)}")
+    guessed = tuple(remark.on_naming(keyboards))
     if given.score is None and not given.may_listen:
-        # Only notes can decide the octave, so the likeliest one is assumed.
-        open_octave = len(keyboards) > 1
-        likeliest = keyboards[0]
-        return [_View(likeliest.plane, likeliest.describe(), likeliest if open_octave else None)]
-    return [
-        _View(keyboard.plane, keyboard.describe(), keyboard if len(keyboards) > 1 else None)
-        for keyboard in keyboards
-    ]
+        # Only notes can decide what is open, so the likeliest is assumed.
+        keyboards = keyboards[:1]
+    return [_View(keyboard.plane, keyboard.describe(), guessed) for keyboard in keyboards]
+
+
+def _not_found(config: RetargetConfig) -> str:
+    """What to do where no keyboard is found."""
+    told = [f"--octave {config.octave}"] if config.octave is not None else []
+    if config.mirrored is not None:
+        told.append("--mirrored" if config.mirrored else "--not-mirrored")
+    where = "mark where it is with `pianomime pick`"
+    if told:
+        return f"no keyboard found that agrees with {' '.join(told)}; give another, or {where}"
+    return f"no keyboard found; {where}"
 
 
 def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
@@ -314,8 +324,7 @@ def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
             taken = _from_score(given, given.score, views, sightings, lights)
         del sightings  # in hours of video, they take much memory
         view, light, tracks = views[taken.view], lights[taken.view], taken.tracks
-        remarks = [] if taken.guess is None else [remark.on_octave(taken.guess)]
-        remarks += [*remark.on_missing_hands(tracks), *remark.on_keyboard(light)]
+        remarks = [*taken.guessed, *remark.on_missing_hands(tracks), *remark.on_keyboard(light)]
         if len(tracks) == _MOST_FRAMES:
             remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
     return _Seen(view, tracks, taken.timed, remarks)
@@ -372,7 +381,7 @@ def _from_video(
     _check_hands(given, tracks)
     read = read_notes(lights[0], tracks, title_of(given.film.path))
     if read.lit:
-        return _Taken(0, tracks, _read_score(read), view.only_guess)
+        return _Taken(0, tracks, _read_score(read), view.guessed)
     advice = "give that with --midi FILE"
     if given.may_listen:
         try:

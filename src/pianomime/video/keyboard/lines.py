@@ -8,11 +8,17 @@ position of every C. Many such lines side by side are a keyboard.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates, maximum_filter1d, minimum_filter1d, uniform_filter1d
+from scipy.ndimage import (
+    gaussian_filter,
+    gaussian_filter1d,
+    map_coordinates,
+    maximum_filter1d,
+    minimum_filter1d,
+    uniform_filter1d,
+)
 
 from pianomime.short_repr import short_repr
 
@@ -23,18 +29,25 @@ _OFF = 0.22
 """[white keys] Greatest distance of a black key from its position."""
 _WIDTHS = (0.25, 0.85)
 """[white keys] Range of the width of a black key."""
-_CONTRAST = 0.12
-"""Least difference of the brightness of black and white keys, 0..1."""
+_CONTRAST = (0.04, 0.12, 0.25)
+"""Least difference of the brightness of black and white keys: at least, at most, and part of the
+brightness of white keys."""
 _FEWEST = 5
 """Least number of black keys on a line."""
 _NARROWEST = 5
 """[pixels] Least width of a white key."""
+_SMALLEST = 8
+"""[pixels] Least height and width of a picture in which there can be a keyboard."""
 _GUESSES = 8
 """Hypotheses about a line that are refined."""
 _LINES = 150
 """Lines at each angle."""
-_ANGLES = np.radians(np.arange(-10, 11, 2.0))
-"""[rad] Angles of the lines with the horizontal, and with the vertical."""
+_ANGLES = np.arange(-10, 11, 2.0)
+"""[degrees] Angles of the lines with the horizontal, and with the vertical."""
+_OTHER_ANGLES = 3
+"""Further angles, those of most edges in the picture, that are searched with their neighbours."""
+_COARSE = 640
+"""[pixels] Longer side of the picture, about, in which the angle is searched."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,23 +118,62 @@ def find_lines(picture: NDArray[np.float32]) -> Lines | None:
     Returns:
         The lines with the highest score; None if there is no keyboard.
     """
+    if min(picture.shape) < _SMALLEST:
+        return None
+    # At half the size and on half the lines, one angle takes a quarter of the time.
+    factor = max(1, round(max(picture.shape) / _COARSE))
+    small = _shrunk(picture, factor)
+    found = _best(small, _angles(small), _LINES // 2)
+    if found is None:
+        # Keys may be too narrow for that.
+        return _best(picture, _angles(picture), _LINES) if factor > 1 else None
+    angle = np.degrees(np.arctan2(found.along[1], found.along[0]))
+    return _best(picture, np.array([angle]), _LINES)
+
+
+def _best(picture: NDArray[np.float32], angles: NDArray[np.float64], count: int) -> Lines | None:
+    """The keyboard with the highest score, on `count` lines at each of the angles [degrees]."""
     best: Lines | None = None
-    for turn, angle in product((0.0, np.pi / 2), _ANGLES):
-        found = _at_angle(picture, turn + angle)
+    for angle in np.radians(angles):
+        found = _at_angle(picture, float(angle), count)
         if found is not None and (best is None or found.score > best.score):
             best = found
     return best
 
 
-def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
-    """The keyboard on lines at one angle [rad]."""
+def _shrunk(picture: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
+    """The picture at 1 / factor of its size."""
+    height, width = (size // factor for size in picture.shape)
+    blocks = picture[: height * factor, : width * factor].reshape(height, factor, width, factor)
+    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)
+
+
+def _angles(picture: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Angles [degrees] at which a keyboard may lie: near the picture's sides, and as most edges."""
+    usual = (_ANGLES + np.array([[0.0], [90.0]])).ravel()
+    smooth = gaussian_filter(np.asarray(picture, np.float64), 1.0)
+    down, right = np.gradient(smooth)
+    # Keys are rectangles: their long and their short sides are at one angle, modulo 90 degrees.
+    angle = np.degrees(np.arctan2(down, right)) % 90
+    weight = np.hypot(down, right)
+    edges = np.histogram(angle, 90, (0, 90), weights=np.where(weight > 0.01, weight, 0))[0]
+    edges = gaussian_filter1d(edges, 1.0, mode="wrap")
+    peaks = np.flatnonzero(edges == maximum_filter1d(edges, 7, mode="wrap"))
+    peaks = peaks[(peaks > _ANGLES[-1]) & (peaks < 90 + _ANGLES[0]) & (edges[peaks] > 0)]
+    peaks = peaks[np.argsort(-edges[peaks], kind="stable")][:_OTHER_ANGLES]
+    other = (peaks[:, None] + 0.5 + np.array([-2.0, 0.0, 2.0])).ravel()
+    return np.concatenate((usual, other, other + 90))
+
+
+def _at_angle(picture: NDArray[np.float32], angle: float, count: int) -> Lines | None:
+    """The keyboard on `count` lines at one angle [rad]."""
     height, width = picture.shape
     along = np.array([np.cos(angle), np.sin(angle)])
     across = np.array([-along[1], along[0]])
     origin = np.array([width, height]) / 2
     half_s, half_r = (float(np.abs(way) @ [width, height]) / 2 for way in (along, across))
     s = np.arange(-half_s, half_s)
-    rows = np.linspace(-half_r, half_r, _LINES)
+    rows = np.linspace(-half_r, half_r, count)
     places = origin + s[None, :, None] * along + rows[:, None, None] * across
     profiles = sample(picture, places)
     window = max(15, len(s) // 8)
@@ -129,7 +181,8 @@ def _at_angle(picture: NDArray[np.float32], angle: float) -> Lines | None:
     filled = uniform_filter1d(filled, 3, axis=1)
     low = minimum_filter1d(filled, window, axis=1)
     high = maximum_filter1d(filled, window, axis=1)
-    dark = (filled < (low + high) / 2) | (high - low < _CONTRAST)
+    least, most, part = _CONTRAST
+    dark = (filled < (low + high) / 2) | (high - low < np.clip(part * high, least, most))
     fits = [_fit(mask, s) for mask in dark]
     scores = np.array([0.0 if fit is None else fit.score for fit in fits])
     if scores.max() < _FEWEST:

@@ -26,7 +26,7 @@ _OFF_LINE = 0.003
 
 
 def refine(
-    picture: NDArray[np.float32], plane: Plane
+    picture: NDArray[np.float32], plane: Plane, known: NDArray[np.int64]
 ) -> tuple[Plane, NDArray[np.bool_], float, float] | None:
     """Fit a plane to the edges of keys that are found near those that it predicts.
 
@@ -35,14 +35,19 @@ def refine(
     Args:
         picture: (height, width) brightness, 0..1.
         plane: a first guess.
+        known: (2,) numbers of the first and the last white key near which the guess is good.
 
     Returns:
         The plane, (88,) bool the keys with edges, and the median error [m] and [pixels]; None if
         too few edges are found.
     """
     seen = np.zeros(KEYS, bool)
-    for window in (0.4, 0.25, 0.2):
-        edges = _find_edges(picture, plane, window)
+    middle, half = known.mean() + 0.5, float(known[1] - known[0] + 1) / 2
+    # From the middle outward, since a guess that is wrong by half a key at the ends, as in pictures
+    # through wide lenses, would take each edge for its neighbour there.
+    for window, part in ((0.4, 0.5), (0.4, 0.75), (0.3, 1.0), (0.25, np.inf), (0.2, np.inf)):
+        reach = LEFT_EDGE + WHITE_WIDTH * (middle + np.array([-1, 1]) * part * half)
+        edges = _find_edges(picture, plane, window, reach)
         if len(edges.pixels) < 12:
             return None
 
@@ -59,7 +64,7 @@ def refine(
             return None
         plane = Plane(np.append(solution.x, 1.0).reshape(3, 3))
         seen = edges.seen
-    edges = _find_edges(picture, plane, 0.2)
+    edges = _find_edges(picture, plane, 0.2, np.array([-np.inf, np.inf]))
     if len(edges.pixels) < 12:
         return None
     world = plane.to_world(edges.pixels)
@@ -90,8 +95,17 @@ class _Edges:
     seen: NDArray[np.bool_]
 
 
-def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _Edges:
-    """Find edges of keys within `window` widths of a white key from those that a plane predicts."""
+def _find_edges(
+    picture: NDArray[np.float32], plane: Plane, window: float, reach: NDArray[np.float64]
+) -> _Edges:
+    """Find edges of keys within `window` widths of a white key from those that a plane predicts.
+
+    Args:
+        picture: (height, width) brightness, 0..1.
+        plane: the plane.
+        window: [white keys].
+        reach: (2,) least and greatest world y of the keys [m].
+    """
     pixels, axis, value, weight = [], [], [], []
     seen = np.zeros(KEYS, bool)
     span = np.linspace(-window, window, 33) * WHITE_WIDTH
@@ -102,7 +116,8 @@ def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _E
     world = np.stack(np.broadcast_arrays(row[:, None], whites[gap][:, None] + span), axis=-1)
     profile = sample(picture, plane.to_pixels(world))
     place, depth = _dip(profile, span)
-    good = depth > 0.02
+    near = (whites >= reach[0]) & (whites <= reach[1])
+    good = (depth > 0.02) & near[gap]
     pixels.append(plane.to_pixels(np.stack([row[good], whites[gap[good]] + place[good]], axis=-1)))
     axis.append(np.ones(good.sum(), int))
     value.append(whites[gap[good]])
@@ -122,17 +137,17 @@ def _find_edges(picture: NDArray[np.float32], plane: Plane, window: float) -> _E
     centres = key_centres()[WHITES, 1]
     # In a wide window and with less weight, since black keys of most pianos are longer than those
     # of the world.
-    reach = np.linspace(-0.013, 0.013, 53)
+    off = np.linspace(-0.013, 0.013, 53)
     for x, along, sign, trust in (
         (BLACK_FRONT, blacks, 1, 0.23),
         (FRONT, centres, -1, 0.33),
         # Lids and glow make the far end uncertain.
         (FAR, free, 1, 0.23),
     ):
-        world = np.stack(np.broadcast_arrays(x + reach, along[:, None]), axis=-1)
+        world = np.stack(np.broadcast_arrays(x + off, along[:, None]), axis=-1)
         profile = sample(picture, plane.to_pixels(world))
-        place, height = _step(sign * profile, reach)
-        good = height > 0.06
+        place, height = _step(sign * profile, off)
+        good = (height > 0.06) & (along >= reach[0]) & (along <= reach[1])
         if good.sum() > 3:
             # The edges of all keys are on one line; edges off that line are of a shelf or a shadow.
             at, slope = line_through(along[good], place[good])
