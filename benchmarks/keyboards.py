@@ -5,9 +5,8 @@
 
 It needs the reference data (PIANOMIME_SHARED): frames with the places of white keys, marked by eye,
 and a film whose plane is known. `right`: every key has its name and is in its place (half a white
-key on frames, 6 mm on variants), and no doubt is said, or only of the octave where it cannot be
-known. `wrong`: it is not, without a word. `doubt`: refused, or more than one naming is said to be
-possible.
+key on frames, 6 mm on variants), and no doubt is said. `wrong`: it is not, without a word. `doubt`:
+refused, or more than one naming is said to be possible.
 """
 
 from __future__ import annotations
@@ -106,9 +105,7 @@ def _judge_frame(truth: dict[str, Any], found: list[Keyboard]) -> dict[str, Any]
     if truth["octave_known"]:
         octave = 0
     right = bool(np.abs(off - octave).max() < 0.6) and found[0].mirrored == truth["mirrored"]
-    mirror_open = len({each.mirrored for each in found}) > 1
-    sure = len(found) == 1 or not (truth["octave_known"] or mirror_open)
-    verdict = ("right" if right else "wrong") if sure else "doubt"
+    verdict = ("right" if right else "wrong") if len(found) == 1 else "doubt"
     return {"verdict": verdict, "said": _said(found)}
 
 

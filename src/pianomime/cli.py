@@ -84,6 +84,9 @@ COMMANDS = {
     "retarget": Command(
         "pianomime.commands.retarget", "Retarget", "make a demonstration of a video"
     ),
+    "keyboard": Command(
+        "pianomime.commands.keyboard", "FindKeyboard", "find the keyboard in a picture or a video"
+    ),
     "pick": Command("pianomime.commands.pick", "Pick", "show where the keyboard is in a video"),
     "import-demos": Command(
         "pianomime.commands.import_demos", "ImportDemos", "read the paper's demonstrations"

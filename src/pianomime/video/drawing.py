@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from pianomime.keyboard import BLACK, KEYS, NO_KEY
+from pianomime.keyboard import BLACK, KEYS, NO_KEY, key_name
 from pianomime.palette import DARK, rgb
 from pianomime.plan import LEFT
 from pianomime.video.keyboard.geometry import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
@@ -27,6 +27,35 @@ def key_outline(key: int) -> NDArray[np.float64]:
     half = key_half_sizes()[key, 1] if BLACK[key] else WHITE_WIDTH / 2
     front = BLACK_FRONT if BLACK[key] else FRONT
     return np.array([[FAR, y - half], [FAR, y + half], [front, y + half], [front, y - half]])
+
+
+def draw_keys(picture: NDArray[np.uint8], plane: Plane) -> NDArray[np.uint8]:
+    """Draw the outlines of the keys, and the names of the Cs.
+
+    Args:
+        picture: (height, width, 3) uint8; it is not changed.
+        plane: plane of the keyboard in it.
+
+    Returns:
+        (height, width, 3) uint8.
+    """
+    image = Image.fromarray(picture).convert("RGB")
+    pen = ImageDraw.Draw(image, "RGBA")
+    for key in range(KEYS):
+        outline = plane.to_pixels(key_outline(key))
+        pen.polygon(_corners(outline), outline=(*_GRID, 160))
+        if key_name(key).startswith("C") and not BLACK[key]:
+            width = float(np.linalg.norm(outline[2] - outline[3]))
+            pen.text(
+                tuple(outline.mean(axis=0) * 0.3 + (outline[2] + outline[3]) * 0.35),
+                key_name(key),
+                fill=(255, 255, 255),
+                anchor="mm",
+                font_size=max(8.0, 0.7 * width),
+                stroke_width=2,
+                stroke_fill=(0, 0, 0),
+            )
+    return np.asarray(image, np.uint8)
 
 
 class Drawing:

@@ -62,6 +62,12 @@ class KeyEvidence:
         odds = np.where(self.faint, -0.1, odds)
         return np.asarray(np.where(self.part >= _PART, np.nan_to_num(odds) * self.part, 0.0))
 
+    def hidden(self) -> int:
+        """Number of places between the outermost keys that are seen where no key is seen."""
+        odds = self.odds()
+        keys = np.flatnonzero(odds > 0)
+        return int((odds[keys[0] : keys[-1]] < 0).sum()) if len(keys) else 0
+
 
 def look_along(picture: NDArray[np.float32], plane: Plane, known: NDArray[np.int64]) -> KeyEvidence:
     """Look along a keyboard and beyond its ends.

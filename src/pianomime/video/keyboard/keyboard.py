@@ -112,8 +112,12 @@ def find_keyboards(
     ]
     found = []
     for way in ways:
-        if way.score < ways[0].score - _CLEAR:
-            break
+        clear = _CLEAR
+        if ways[0].mirrored and not way.mirrored:
+            # What hides keys may hide, or look like, the ends that tell of a mirror.
+            clear += evidence.hidden()
+        if way.score < ways[0].score - clear:
+            continue
         named = refine(picture, way.apply(base), way.renamed(whites))
         if named is not None and _fits(named[0], named[1], picture.shape):
             found.append(Keyboard(*named, way.mirrored, way.lowest_c(evidence)))

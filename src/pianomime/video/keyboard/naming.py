@@ -22,10 +22,10 @@ _MIRROR = 3.0
 """How much better a mirrored naming must be: films are hardly ever mirrored."""
 _END = float(np.log(_OCTAVE))
 """For an end of the keyboard where the keys cease: by chance it would be any key of an octave."""
-_BEYOND = 2.0
+_BEYOND = 1.0
 """Most that all places beyond one end of what is seen say against keys: a sleeve, a lamp or a title
 may hide as many keys as it likes."""
-_MIDDLE = 0.02
+_MIDDLE = 0.005
 """For each white key by which the middle of what is seen is off the middle of the keyboard."""
 _TURN = 49
 """In a mirror, edge n of the white keys is where edge 49 - n was, in some octave."""
