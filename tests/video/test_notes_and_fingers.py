@@ -83,11 +83,19 @@ def test_a_key_that_is_down_most_of_the_time_is_read(score, points):
     assert read.onset[read.key == 10] == pytest.approx([1.2], abs=0.051)
 
 
-def test_keys_that_only_go_down_are_not_lit(score, points):
-    """They get darker, where fingers are, by as much as some lights would change them."""
-    light = np.full((len(points), 3, 88, 3), (200, 190, 170), np.uint8)
+@pytest.mark.parametrize(
+    ("rest", "down"),
+    [
+        ((200, 190, 170), (160, 150, 130)),
+        ((100, 130, 190), (60, 90, 150)),  # in blue light
+        ((90, 92, 98), (195, 200, 212)),  # where they reflect a window
+    ],
+)
+def test_keys_that_only_go_down_are_not_lit(score, points, rest, down):
+    """They change, where fingers are, by as much as some lights would change them."""
+    light = np.full((len(points), 3, 88, 3), rest, np.uint8)
     for key, onset, offset in zip(score.key, score.onset, score.offset, strict=True):
-        light[int(onset * 20) : int(np.ceil(offset * 20)), :, key] -= 40
+        light[int(onset * 20) : int(np.ceil(offset * 20)), :, key] = down
     read = notes_read(light, tracks(points), "read")
     assert not read.lit
     assert read.confidence == 1
