@@ -39,8 +39,8 @@ class Teller:
         heard(seconds / 2)
         heard(seconds)
         score = self.score
-        # Stretches begin at full multiples of 10 s.
-        begin = round(float(samples[0] - _BASE) / _RISE / 10) * 10.0 if self.ramp else 0.0
+        # Stretches begin at even seconds, and 16 bits tell these apart.
+        begin = round(float(samples[0] - _BASE) / _RISE / 2) * 2.0 if self.ramp else 0.0
         note, foot = (
             (onset >= begin) & (onset < begin + seconds)
             for onset in (score.onset, score.pedal[:, 0])

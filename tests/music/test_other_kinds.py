@@ -17,11 +17,15 @@ from pianomime.songs.find import find_song, find_songs
 
 _MUSIC = songs.path("twinkle-twinkle").read_bytes()
 
-_HELPS = {
-    "a song.mp3": "transcribed to MIDI",
-    "a song.WAV": "transcribed to MIDI",
+_RECORDINGS = {
+    "a song.mp3": "`pianomime transcribe {quoted}`",
+    "a song.WAV": "`pianomime transcribe {quoted}`",
     "a song.mp4": "`pianomime retarget {quoted}`",
-    "song.webm": "`pianomime retarget {path}`",
+    "song.webm": "and `pianomime transcribe {path}` makes MIDI of its sound",
+}
+"""These are played by `pianomime play`, which transcribes them."""
+_HELPS = {
+    **_RECORDINGS,
     "song.musicxml": "File > Export, or `mscore -o song.mid {path}`",
     "song.MXL": "mscore -o song.mid",
     "song.xml": "mscore -o song.mid",
@@ -35,7 +39,8 @@ _HELPS = {
 
 @pytest.mark.parametrize(
     ("command", "name"),
-    [("play", name) for name in _HELPS]
+    [("play", name) for name in _HELPS if name not in _RECORDINGS]
+    + [("evaluate", name) for name in _RECORDINGS]
     + [
         (command, "song.abc")
         for command in ("evaluate", "train-expert", "train-goal", "train-sac", "train-fingers")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
 from fractions import Fraction
 from html import escape
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import made_up_video as made_up
+from made_up_listener import Teller
 from pianomime import cli
 from pianomime.errors import InputError
 from pianomime.file_names import file_name
@@ -19,6 +21,7 @@ from pianomime.keyboard import NO_KEY
 from pianomime.music import onset_f1
 from pianomime.plan.demonstration import Demonstration
 from pianomime.shown import shown
+from pianomime.transcription import listener as listening
 from pianomime.video import retarget as room
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
@@ -127,6 +130,94 @@ def test_a_film_whose_keys_do_not_light_up(hands, tmp_path, score, plan, plane, 
     assert not out.parent.exists()
 
 
+@pytest.fixture(scope="module")
+def unlit(tmp_path_factory, score, plan, plane):
+    """A video whose keys do not light up, with sound; its file begins at 0.7 s."""
+    folder = tmp_path_factory.mktemp("unlit")
+    path = folder / "silent.mp4"
+    made_up.write(path, plane, SIZE, score, plan, made_up.times(5.0, 24), light_up=False)
+    return with_sound(path, folder / "unlit.mp4", delay=0.7, seconds=5.0, begins=0.0)
+
+
+@pytest.mark.parametrize("notes", ["auto", "sound"])
+def test_notes_of_the_sound(unlit, hands, score, notes):
+    # The sound is a little early.
+    heard = replace(score, onset=score.onset - 0.1, offset=score.offset - 0.1)
+    config = RetargetConfig(hand_model=hands, notes=notes)
+    made = retarget(unlit, config, listener=Teller(heard))
+    quality = made.demonstration.quality
+    assert quality["notes_from"] == "sound"
+    assert quality["offset_seconds"] == pytest.approx(0.1, abs=0.04)
+    assert quality["notes_touched"] > 0.9
+    np.testing.assert_array_equal(made.demonstration.score.key, score.key)
+    np.testing.assert_allclose(made.demonstration.score.onset, score.onset, atol=0.05)
+
+
+def test_light_is_taken_where_keys_light_up(video, hands, tmp_path, monkeypatch):
+    """As without a listener, bit for bit; nobody listens."""
+    loud = with_sound(video, tmp_path / "made-up.mp4", delay=0.0, begins=0.0)
+    monkeypatch.setattr(room, "transcribe", lambda *_: pytest.fail("listened"))
+    config = RetargetConfig(hand_model=hands)
+    for name, listener in (("with", Teller(made_up.song(5.0))), ("without", None)):
+        retarget(loud, config, listener=listener).demonstration.save(tmp_path / f"{name}.npz")
+    retarget(loud, replace(config, notes="light")).demonstration.save(tmp_path / "light.npz")
+    with_, without, light = (
+        Demonstration.load(tmp_path / f"{name}.npz") for name in ("with", "without", "light")
+    )
+    assert with_.quality == without.quality == light.quality
+    assert with_.quality["notes_from"] == "video, from keys that light up"
+    for other in (without, light):
+        np.testing.assert_array_equal(with_.score.onset, other.score.onset)
+        np.testing.assert_array_equal(with_.plan.fingertips, other.plan.fingertips)
+
+
+def test_a_sound_of_something_else_is_of_no_help(unlit, hands, score):
+    other = Teller(score.transpose(23))
+    with pytest.raises(InputError, match=r"unlit\.mp4: its sound is not of what is seen: at best"):
+        retarget(unlit, RetargetConfig(hand_model=hands, notes="sound"), listener=other)
+    made = retarget(
+        unlit, RetargetConfig(hand_model=hands, notes="sound", offset=0.0), listener=other
+    )
+    assert any("the sound may not be of what is seen" in remark for remark in made.remarks)
+    # By default there are still the keys, as well as they are seen.
+    config = RetargetConfig(hand_model=hands)
+    try:
+        made = retarget(unlit, config, listener=other)
+    except InputError as error:
+        assert "the sound is of no help" in str(error)  # noqa: PT017
+    else:
+        assert any("the sound is of no help" in remark for remark in made.remarks)
+
+
+def test_a_video_without_sound(video, hands, untouched):
+    with pytest.raises(InputError, match="has no sound"):
+        retarget(
+            video,
+            RetargetConfig(hand_model=hands, notes="sound"),
+            listener=Teller(made_up.song(5.0)),
+        )
+
+
+@pytest.mark.parametrize(
+    ("notes", "with_midi", "why"),
+    [
+        ("midi", False, "--notes midi needs --midi"),
+        ("sound", True, "--notes sound goes without --midi"),
+        ("light", True, "--notes light goes without --midi"),
+    ],
+)
+def test_notes_of_two_places(video, midi, hands, untouched, notes, with_midi, why):
+    config = RetargetConfig(midi=midi if with_midi else None, hand_model=hands, notes=notes)
+    with pytest.raises(InputError, match=why):
+        retarget(video, config)
+
+
+def test_the_extra_audio_is_missed_first(unlit, hands, untouched, monkeypatch):
+    monkeypatch.setattr(listening, "find_spec", lambda _: None)
+    with pytest.raises(InputError, match=r"install.*\[audio\]"):
+        retarget(unlit, RetargetConfig(hand_model=hands, notes="sound"))
+
+
 @pytest.fixture
 def untouched(monkeypatch):
     """Nothing that takes long may begin."""
@@ -225,8 +316,8 @@ def test_mediapipe_is_missed_first(tmp_path, monkeypatch, capsys):
     assert "\n" not in printed
 
 
-def with_sound(video, path, delay, seconds=3.0):
-    """A copy of a video with a tone that begins at its second second, in a file that is late."""
+def with_sound(video, path, delay, seconds=3.0, begins=2.0):
+    """A copy of a video with a tone that begins at some second of it, in a file that is late."""
     rate = 44_100
     with av.open(str(video)) as old, av.open(str(path), "w") as new:
         pictures = new.add_stream_from_template(old.streams.video[0])
@@ -238,7 +329,7 @@ def with_sound(video, path, delay, seconds=3.0):
                 packet.pts, packet.dts = packet.pts + late, packet.dts + late
                 new.mux(packet)
         times = np.arange(round((delay + seconds) * rate)) / rate - delay
-        tone = (0.5 * np.sin(2 * np.pi * 440 * times) * (times >= 2)).astype(np.float32)
+        tone = (0.5 * np.sin(2 * np.pi * 440 * times) * (times >= begins)).astype(np.float32)
         frame = av.AudioFrame.from_ndarray(tone[None], format="fltp", layout="mono")
         frame.sample_rate, frame.pts, frame.time_base = rate, 0, Fraction(1, rate)
         new.mux(sound.encode(frame))

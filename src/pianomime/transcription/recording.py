@@ -20,7 +20,7 @@ from pianomime.short_repr import short_repr
 
 _OWN = 600
 """[s] What a stretch has for its own: hours at once take gigabytes."""
-_LAP = 20
+_LAP = 16
 """[s] What it shares with those beside it, so that notes at its ends are heard in full."""
 
 
