@@ -33,7 +33,7 @@ class Retarget:
     midi: Annotated[Path | None, tyro.conf.arg(metavar="SONG.mid", help_behavior_hint="")] = None
     """MIDI file of what is played; by default the notes are taken from the video."""
     notes: Literal["auto", "midi", "light", "sound"] = "auto"
-    """What the notes are taken from: the MIDI file, keys that light up or go down, or the sound of
+    """What the notes are taken from: the MIDI file, keys that light up, or the sound of
     the video. By default the MIDI file if there is one, else light where keys light up, else sound
     where the extra `audio` is installed."""
     points: Annotated[Path | None, tyro.conf.arg(metavar="POINTS.json", help_behavior_hint="")] = (
