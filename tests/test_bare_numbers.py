@@ -49,6 +49,11 @@ ALLOWED = {
     ("plan/joint_path.py", '"LFJ5": 0.05'),
     ("track/note_sampling.py", "wrist: float = 0.05"),
     ("plan/hand_path.py", "slide_acceleration=20.0"),
+    # Steps of brightness, of 255, angles of hues [degrees], and counts of white keys.
+    ("video/notes/lit.py", "_COLOURFUL = 30.0"),
+    ("video/notes/lit.py", "_GAIN = 20.0"),
+    ("video/notes/lit.py", "_SAME_HUE = 20.0"),
+    ("video/keyboard/naming.py", "_SIZES = ((0, len(WHITES), 0.0), (9, 36, float(np.log(5))))"),
     # Times that have nothing to do with frames [s].
     ("music/metrics.py", "ONSET_TOLERANCE = 0.05"),
     ("music/protocol.py", "onset_tolerances: tuple[float, ...] = (0.050"),
