@@ -180,7 +180,7 @@ def test_a_sound_of_something_else_is_of_no_help(unlit, hands, score):
     )
     assert any("the sound may not be of what is seen" in remark for remark in made.remarks)
     # By default it is not used, and keys that do not light up say nothing.
-    with pytest.raises(InputError, match="do not light up.* its sound is of no help"):
+    with pytest.raises(InputError, match=r"do not light up.*its sound is of no help"):
         retarget(unlit, RetargetConfig(hand_model=hands), listener=other)
 
 
