@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import tempfile
 import time
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,7 @@ def _synthesized(path: Path, seconds: float) -> dict[str, Any]:
 
     score = excerpt(Score.from_midi(path), seconds=seconds)
     with tempfile.TemporaryDirectory() as folder:
-        sound = Path(folder, "song.wav")
+        sound = Path(folder, f"{path.stem}.wav")
         write_wav(sound, render_audio(score))
         return {"recording": path.stem, **_heard(sound, score)}
 
@@ -67,18 +68,26 @@ def _film(path: Path, known: Path) -> dict[str, Any]:
     return {"recording": path.stem, **_heard(path, Score.from_midi(known))}
 
 
+@cache
+def _listener() -> Any:
+    """The network, loaded once."""
+    from pianomime.transcription.listener import find_listener
+
+    return find_listener()
+
+
 def _heard(recording: Path, known: Any) -> dict[str, Any]:
     from pianomime.music import music_metrics
-    from pianomime.transcription.listener import find_listener
     from pianomime.transcription.recording import Recording
     from pianomime.transcription.transcribe import transcribe
 
-    listener = find_listener()
+    listener = _listener()
     given = Recording.of(recording)
     wall, cpu = time.perf_counter(), time.process_time()
     heard = transcribe(given, listener)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     metrics = music_metrics(known, heard)
+    print(f"{recording.stem}: F1 {metrics.note_f1_50:.3f}", flush=True)
     return {
         "notes": len(known),
         "heard": len(heard),
