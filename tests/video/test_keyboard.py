@@ -127,26 +127,26 @@ def test_what_is_known_decides():
 
 
 def _bricks():
-    rows, columns = np.mgrid[:360, :640]
+    rows, columns = np.mgrid[:180, :320]
     shifted = columns + 30 * (rows // 30 % 2)
     return np.where((rows % 30 < 4) | (shifted % 60 < 4), 0.8, 0.35)
 
 
 def _zebra():
-    rows, columns = np.mgrid[:360, :640]
+    rows, columns = np.mgrid[:180, :320]
     return (np.sin((columns + 12 * np.sin(rows / 40)) / 5 + rows / 60) > 0).astype(float)
 
 
 NO_KEYBOARD = {
-    "black": np.zeros((360, 640)),
-    "noise": np.random.default_rng(0).random((360, 640)),
-    "stripes": np.tile(np.arange(640) // 12 % 2, (360, 1)),
+    "black": np.zeros((180, 320)),
+    "noise": np.random.default_rng(0).random((180, 320)),
+    "stripes": np.tile(np.arange(320) // 12 % 2, (180, 1)),
     "zebra": _zebra(),
     "bricks": _bricks(),
-    "grey": np.full((360, 640), 0.5),
-    "ramp": np.linspace(0, 1, 640)[None].repeat(360, axis=0),
+    "grey": np.full((180, 320), 0.5),
+    "ramp": np.linspace(0, 1, 320)[None].repeat(180, axis=0),
     "one pixel": np.ones((1, 1)),
-    "one row": np.random.default_rng(0).random((1, 640)),
+    "one row": np.random.default_rng(0).random((1, 320)),
     "tiny": np.random.default_rng(0).random((9, 16)),
 }
 
