@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pianomime import Score, load_player, songs
+from pianomime import Performance, Score, load_player, songs
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_RATE
 from pianomime.music import excerpt
@@ -87,6 +87,21 @@ def test_the_hands_move_on_from_where_they_are(monkeypatch: pytest.MonkeyPatch) 
             inside = np.abs(np.diff(one._paths[hand], n=2, axis=0)).max()
             at_the_seam = np.abs(np.diff(across, n=2, axis=0)).max()
             assert at_the_seam <= inside
+
+
+def test_controls_do_not_jump_where_stretches_meet() -> None:
+    score = excerpt(Score.from_midi(songs.path("c-major-study")), 0.0, 6.0, 0.5)
+    ours = player(HorizonConfig(first=4.0))
+    at_once, by_stretches = whole(ours).play(score), ours.play(score)
+    meet = round(4.0 * FRAME_RATE)
+
+    def step(played: Performance) -> float:
+        """How far the controls move from the last one of a stretch to the next one."""
+        before, after = played.ctrl[meet - 1, -1], played.ctrl[meet, 0]
+        return float(np.abs(after - before).max())
+
+    # By targets that jump to those of the next frame it is 8 times as far.
+    assert step(by_stretches) < 2 * step(at_once)
 
 
 @pytest.mark.parametrize("edge", range(9, 26, 2))

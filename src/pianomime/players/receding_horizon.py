@@ -97,12 +97,14 @@ class RecedingHorizonController:
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) as `KeystrokeController.control`; the next stretch is planned when it begins."""
         if frame >= self._growing.planned * self.controls_per_frame:
-            poses = self._stretch.poses_before(self._growing.planned - self._begin)
+            paths = self._stretch.paths_about(self._growing.planned - self._begin)
             self._begin = self._growing.planned
-            self._stretch = self._follow(poses)
+            self._stretch = self._follow(paths)
         return self._stretch.control(frame - self._begin * self.controls_per_frame, world)
 
-    def _follow(self, poses: list[NDArray[np.float64]] | None) -> KeystrokeController:
+    def _follow(
+        self, paths: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]] | None
+    ) -> KeystrokeController:
         """Plan a stretch; what controls it, and what comes just after it."""
         stroke = self._tracker.config.stroke
         takes = stroke.longest + stroke.settle
@@ -125,7 +127,12 @@ class RecedingHorizonController:
         )
         # A finger that is on its key stays where it struck it.
         held = strikes.onset[chosen] < began
-        begun = poses and Continuation(poses, np.where(held, self._x[chosen], np.nan))
+        begun = paths and Continuation(
+            *paths,
+            plan.fingertips[self._begin - 1],
+            plan.finger_key[self._begin - 1] >= 0,
+            np.where(held, self._x[chosen], np.nan),
+        )
         controller = self._tracker.start(stretch, begun or None)
         self._x[chosen] = controller.x
         return controller

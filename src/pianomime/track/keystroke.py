@@ -85,11 +85,18 @@ class Continuation:
     Attributes:
         poses: (left, right) (S + 1, 27) joint positions at the ends of the S controls of the frame
             before the first, the last of them at its end [rad, m].
+        planned: (left, right) (n, 27) joint positions at the ends of the first n controls, as they
+            were planned before what follows was known [rad, m].
+        fingertips: (2, 6, 3) points of the plan in the frame before the first, world frame [m].
+        pressing: (2, 5) bool, fingers that press then.
         x: (M,) world x at which each strike of the plan is struck [m]; NaN for those that the plan
             itself has, because they have not begun.
     """
 
     poses: list[NDArray[np.float64]]
+    planned: list[NDArray[np.float64]]
+    fingertips: NDArray[np.float64]
+    pressing: NDArray[np.bool_]
     x: NDArray[np.float64]
 
     __repr__ = short_repr
@@ -155,6 +162,7 @@ class KeystrokeController:
         self.speeds = config.stroke.speeds(strikes)
         self._hands = hands
         rest = np.zeros((config.controls + 1, LAYOUT.hand_joints))
+        self._begun = begun
         self._before = begun.poses if begun else [rest] * len(hands)
         ends = np.arange(1, len(plan) * config.controls + 1, dtype=np.float64)
         self._times = ends * self._dt
@@ -171,6 +179,9 @@ class KeystrokeController:
         self._strike_with(Corrections.none(len(strikes)))
         steps = Steps("paths", len(hands) * config.path.iterations * len(plan))
         self._paths = np.stack(self._coarse_paths(steps))
+        if begun:
+            for path, planned in zip(self._paths, begun.planned, strict=True):
+                _begin_with(path[1:], planned)
         steps = Steps("controls", self._steps(config.refine))
         self._aim(config.refine, steps.advance)
 
@@ -189,10 +200,13 @@ class KeystrokeController:
         """The steps of `correct`, as it counts them."""
         return self._steps(self.config.again)
 
-    def poses_before(self, frame: int) -> list[NDArray[np.float64]]:
-        """Where the hands should come from when a later frame begins, see `Continuation`."""
+    def paths_about(
+        self, frame: int
+    ) -> tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+        """Poses before a later frame and those planned from it on, as in `Continuation`."""
         stop = frame * self.config.controls + 1
-        return [path[stop - self.config.controls - 1 : stop] for path in self._paths]
+        before = [path[stop - self.config.controls - 1 : stop] for path in self._paths]
+        return before, [path[stop:] for path in self._paths]
 
     def correct(self, corrections: Corrections, advance: Callable[[int], None] = ignore) -> None:
         """Aim at other times and speeds.
@@ -327,6 +341,10 @@ class KeystrokeController:
         ends = np.arange(1, len(self.plan) + 1) * FRAME_SECONDS
         points = self.plan.fingertips[:, index]
         pressing = self.plan.finger_key[:, index] >= 0
+        if self._begun:
+            ends = np.append(0.0, ends)
+            points = np.concatenate((self._begun.fingertips[None, index], points))
+            pressing = np.concatenate((self._begun.pressing[None, index], pressing))
         targets = np.empty((len(self._times), POINT_COUNT, 3))
         for point, axis in np.ndindex(POINT_COUNT, 3):
             # The height of a finger that presses says nothing of where it hovers.
@@ -359,3 +377,11 @@ class KeystrokeController:
             pushing = np.flatnonzero(force[step])
             push = -force[step, pushing, None] * down[pushing]
             self._press[step, index, pushing] = push @ to_control
+
+
+def _begin_with(path: NDArray[np.float64], planned: NDArray[np.float64]) -> None:
+    """Put what was planned at the beginning of a path (n, 27), in place, and fade over to it."""
+    both = min(len(path), len(planned))
+    # The last part was planned without knowing what comes next.
+    share = np.clip(2.0 - 2.0 * np.arange(both) / max(both, 1), 0.0, 1.0)[:, None]
+    path[:both] += share * (planned[:both] - path[:both])
