@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ from pianomime.video.hands.sightings import Sighting
 from pianomime.video.keyboard.plane import Plane, fit_plane
 
 RATE = 20.0
+Moved = Callable[[float], NDArray[np.float64] | None]
+"""(3, 3) homography by which pixels are moved at a time [s]; None for another picture."""
 SKIN = (224, 172, 140)
 LIT = (60, 210, 90)
 
@@ -122,6 +124,7 @@ def write(
     plan: FingertipPlan,
     shown: NDArray[np.float64],
     light_up: bool = True,
+    moved: Moved = lambda _: np.eye(3),
 ) -> None:
     """Write a video of the score being played; frames are `shown` at these times [s]."""
     with av.open(str(path), "w") as film:
@@ -134,11 +137,27 @@ def write(
             sounding = score.key[(score.onset <= at) & (at < score.offset)]
             row = min(int(at * RATE), len(plan) - 1)
             hands = plan.fingertips[row, :, :, :2]
-            seen = picture(plane, size, sounding if light_up else (), hands)
+            way = moved(at)
+            if way is None:
+                seen = np.full((size[1], size[0], 3), 200, np.uint8)
+            else:
+                seen = picture(after(plane, way), size, sounding if light_up else (), hands)
             frame = av.VideoFrame.from_ndarray(seen, format="rgb24")
             frame.pts, frame.time_base = round(at * 6000), Fraction(1, 6000)
             film.mux(stream.encode(frame))
         film.mux(stream.encode(None))
+
+
+def after(plane: Plane, moved: NDArray[np.float64]) -> Plane:
+    """The plane in a picture that is moved."""
+    return Plane(plane.matrix @ np.linalg.inv(moved))
+
+
+def turn(degrees: float, right: float, size: tuple[int, int]) -> NDArray[np.float64]:
+    """A turn about the middle of a picture, and then a move [pixels]."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    u, v = size[0] / 2, size[1] / 2
+    return np.array([[c, -s, u - c * u + s * v + right], [s, c, v - s * u - c * v], [0, 0, 1]])
 
 
 def plan_of(score: Score) -> FingertipPlan:
@@ -154,6 +173,7 @@ class TrueHands:
         size: of the video's pictures [pixels].
         points: (T, 2, 6, 2) world x, y [m] where the hands seem to be, 20 frames a second.
         noise: standard deviation [m].
+        moved: how the pictures are moved.
     """
 
     def __init__(
@@ -162,7 +182,9 @@ class TrueHands:
         size: tuple[int, int],
         points: NDArray[np.float64],
         noise: float = 0.001,
+        moved: Moved = lambda _: np.eye(3),
     ) -> None:
+        self._moved = moved
         self._plane, self._size, self._points, self._noise = plane, size, points, noise
         self._draw = np.random.default_rng(0)
 
@@ -176,7 +198,10 @@ class TrueHands:
         row = min(int(milliseconds * RATE / 1000 + 0.5), len(self._points) - 1)
         points = self._points[row]
         points = points + self._draw.normal(0, self._noise, points.shape)
-        seen = self._plane.to_pixels(points) / self._size
+        way = self._moved(milliseconds / 1000)
+        if way is None:
+            return []
+        seen = after(self._plane, way).to_pixels(points) / self._size
         sightings = [Sighting(seen[0], 0.1), Sighting(seen[1], 0.9)]
         luck = self._draw.random()
         if luck < 0.02:

@@ -84,7 +84,7 @@ def test_with_midi(video, midi, hands, score, plan, plane):
     assert quality["notes_touched"] > 0.9
     assert quality["both_hands_found"] > 0.9
     assert quality["left_right_swaps"] > 0
-    keys = made.plane.to_world(plane.to_pixels([[0.0, -0.5], [0.05, 0.0], [-0.05, 0.5]]))
+    keys = made.track.usual.to_world(plane.to_pixels([[0.0, -0.5], [0.05, 0.0], [-0.05, 0.5]]))
     np.testing.assert_allclose(keys, [[0.0, -0.5], [0.05, 0.0], [-0.05, 0.5]], atol=0.003)
     # The same fingers as those that were drawn.
     shown = made.demonstration
@@ -389,7 +389,43 @@ def test_a_cut_is_noticed(hands, tmp_path, score, plan, plane, midi):
             film.mux(stream.encode(new))
         film.mux(stream.encode(None))
     made = retarget(end, RetargetConfig(midi=midi, hand_model=hands))
-    assert any("not where it was" in remark and "3.5 s" in remark for remark in made.remarks)
+    assert any("no keyboard is seen from 3.5 s to" in remark for remark in made.remarks)
+
+
+@pytest.mark.parametrize("light_up", [True, False])
+def test_a_camera_that_moves(light_up, hands, monkeypatch, tmp_path, score, plan, plane, midi):
+    def moved(at):
+        if 1.0 <= at < 1.6:  # a title
+            return None
+        if at >= 3.5:  # nearer
+            return np.array([[1.3, 0, -80], [0, 1.3, -50], [0, 0, 1]])
+        return made_up.turn(1.5 * np.sin(2 * at), 12 * np.sin(3 * at), SIZE)
+
+    path = tmp_path / "moving.mp4"
+    shown_at = made_up.times(5.0, 20)
+    made_up.write(path, plane, SIZE, score, plan, shown_at, light_up, moved)
+    monkeypatch.setattr(
+        room,
+        "HandDetector",
+        lambda _: made_up.TrueHands(plane, SIZE, plan.fingertips[..., :2], moved=moved),
+    )
+    given = RetargetConfig(midi=None if light_up else midi, hand_model=hands)
+    made = retarget(path, given)
+    assert any("no keyboard is seen from 1.0 s to 1.6 s" in told for told in made.remarks), (
+        made.remarks
+    )
+    heard = score.clip(0.0, 5.0)
+    seen = (heard.onset < 1.0) | (heard.onset > 1.6)
+    if light_up:
+        read = made.demonstration.score
+        expected = heard.key[seen], heard.onset[seen]
+        # Two keys are lit when the keyboard is seen again.
+        assert onset_f1(expected, (read.key, read.onset)) > 0.9
+    frames = np.flatnonzero(~made.track.missing(len(plan)))
+    off = np.linalg.norm(made.tracks.points[frames] - plan.fingertips[frames][..., :2], axis=-1)
+    assert np.median(off) < 0.003
+    write_overlay(made, tmp_path / "seen.mp4")
+    assert Film(tmp_path / "seen.mp4").seconds == pytest.approx(5.0, abs=0.11)
 
 
 def test_the_command_writes_all_or_nothing(video, midi, hands, tmp_path, capsys):

@@ -11,6 +11,7 @@ from pianomime.palette import DARK, rgb
 from pianomime.plan import LEFT
 from pianomime.video.keyboard.geometry import BLACK_FRONT, FAR, FRONT, WHITE_WIDTH
 from pianomime.video.keyboard.plane import Plane
+from pianomime.video.keyboard.track import KeyboardTrack
 from pianomime.world.parameters import key_centres, key_half_sizes
 
 # Bright, because they are seen on pictures that are dark in many places.
@@ -59,19 +60,20 @@ def draw_keys(picture: NDArray[np.uint8], plane: Plane) -> NDArray[np.uint8]:
 
 
 class Drawing:
-    """Draws into pictures of one video, whose camera does not move."""
+    """Draws into pictures of one video."""
 
-    def __init__(self, plane: Plane) -> None:
+    def __init__(self, track: KeyboardTrack) -> None:
         """Prepare to draw.
 
         Args:
-            plane: plane of the keyboard in these pictures.
+            track: of the keyboard.
         """
-        self._plane = plane
-        self._outlines = [plane.to_pixels(key_outline(key)) for key in range(KEYS)]
+        self._track = track
+        self._plane: Plane | None = None
 
     def draw(
         self,
+        frame: int,
         picture: NDArray[np.uint8],
         points: NDArray[np.floating],
         found: NDArray[np.bool_],
@@ -80,6 +82,7 @@ class Drawing:
         """Draw key grid, hands, pressed keys and the finger on each.
 
         Args:
+            frame: number of the frame; where no keyboard is seen, nothing is drawn.
             picture: (height, width, 3) uint8; it is not changed.
             points: (2, 6, 2) world x, y of both hands' points [m].
             found: (2,) bool, hands that were seen; the others are drawn in another colour.
@@ -88,11 +91,17 @@ class Drawing:
         Returns:
             (height, width, 3) uint8.
         """
+        plane = self._track.at(frame)
+        if plane is None:
+            return picture
+        if plane is not self._plane:
+            self._plane = plane
+            self._outlines = [plane.to_pixels(key_outline(key)) for key in range(KEYS)]
         image = Image.fromarray(picture).convert("RGB")
         pen = ImageDraw.Draw(image, "RGBA")
         for outline in self._outlines:
             pen.polygon(_corners(outline), outline=(*_GRID, 90))
-        places = self._plane.to_pixels(points)
+        places = plane.to_pixels(points)
         radius = max(3.0, picture.shape[1] / 320)
         for hand, colour in enumerate(_HANDS):
             for finger, key in enumerate(finger_key[hand]):

@@ -13,12 +13,11 @@ from pianomime.music.score import MAX_SECONDS
 from pianomime.progress import Progress, no_progress
 from pianomime.shown import title_of
 from pianomime.video import remarks as remark
-from pianomime.video.film.background import background
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import nobody
-from pianomime.video.keyboard.keyboard import find_keyboards
 from pianomime.video.keyboard.points import NamedPoints
+from pianomime.video.keyboard.views import find_views, view_of_points
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.reading import read_notes
 
@@ -33,7 +32,7 @@ def notes_of_lit_film(
     Where hands are in it as well, `retarget` reads notes better, since these have to agree.
 
     Args:
-        video: a video of a keyboard from above, whose camera does not move.
+        video: a video of a keyboard from above.
         points: named points of the keyboard; by default it is found automatically.
         progress: called in the phases "keyboard", "keys" and "notes".
 
@@ -48,30 +47,27 @@ def notes_of_lit_film(
     most = int(MAX_SECONDS * FRAME_RATE) - 1
     if film.seconds > MAX_SECONDS:
         raise InputError(f"{film.path}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
-    progress("keyboard", 0, 0)
-    notes: tuple[str, ...] = ()
     if points is None:
-        keyboards = find_keyboards(background(film))
-        if not keyboards:
-            raise InputError(
-                f"{film.path}: no keyboard found; mark where it is with "
-                f"`pianomime pick {film.path}`"
-            )
-        plane = keyboards[0].plane
-        notes = tuple(remark.on_naming(keyboards))
+        view = find_views(film, most, None, None, progress)[0]
     else:
-        plane = points.plane.zoomed(1 / film.zoom)
-    reader = KeyLight(plane, (round(film.width / film.zoom), round(film.height / film.zoom)))
+        view = view_of_points(points, film)
+    reader = KeyLight(view.track, film.working_size)
     total = round(film.seconds * FRAME_RATE)
     with LightRecord(len(ZONES)) as light:
         for number, frame in enumerate(islice(film.frames(FRAME_RATE), most)):
-            light.append(reader.read(frame.picture))
+            light.append(reader.read(number, frame.picture))
             progress("keys", number + 1, max(total, number + 1))
         progress("notes", 0, 0)
+        frames = len(light)
         read = read_notes(light, nobody(len(light)), title_of(film.path))
     if not read.lit:
         raise InputError(
             f"{film.path}: keys do not light up in this film (confidence {read.confidence:.0%}), "
             "so it does not show what is played"
         )
-    return replace(read.score, remarks=notes)
+    told = [
+        *remark.on_naming(view.namings),
+        *remark.on_stretches(view),
+        *remark.on_unseen_keyboard(view.track.missing(frames)),
+    ]
+    return replace(read.score, remarks=tuple(told))

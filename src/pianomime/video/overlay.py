@@ -30,7 +30,7 @@ def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress
         path: MP4 file; it appears only when complete.
         progress: called after every frame, in the phase "overlay".
     """
-    drawing = Drawing(made.plane)
+    drawing = Drawing(made.track)
     finger_key = made.demonstration.plan.finger_key
     nothing = np.full((2, FINGER_COUNT), NO_KEY, np.int8)
     tracks = made.tracks
@@ -39,6 +39,7 @@ def write_overlay(made: Retargeted, path: Path, progress: Progress = no_progress
         film: Mp4 | None = None
         for number, frame in enumerate(frames):
             drawn = drawing.draw(
+                number,
                 frame.picture,
                 tracks.points[number],
                 tracks.found[number],

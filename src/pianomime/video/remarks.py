@@ -14,6 +14,7 @@ from pianomime.plan import LEFT, RIGHT, FingertipPlan
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.keyboard.keyboard import Keyboard
+from pianomime.video.keyboard.views import View
 from pianomime.video.notes.fingers import NoteFingers
 from pianomime.video.notes.key_light import ZONES
 from pianomime.video.notes.offset import Offset
@@ -54,8 +55,10 @@ def on_naming(keyboards: Sequence[Keyboard]) -> list[str]:
     Args:
         keyboards: the keyboard in each way to name its keys, the one that is assumed first.
     """
+    remarks: list[str] = []
+    if len(keyboards) < 2:  # marked by a person, or sure
+        return remarks
     assumed, *others = keyboards
-    remarks = []
     if any(other.lowest_c != assumed.lowest_c for other in others):
         remarks.append(
             f"the video leaves the octave open: its lowest C is taken for C{assumed.lowest_c} "
@@ -68,6 +71,27 @@ def on_naming(keyboards: Sequence[Keyboard]) -> list[str]:
             "--not-mirrored tells it; a MIDI file would decide)"
         )
     return remarks
+
+
+def on_stretches(view: View) -> list[str]:
+    """Remarks on stretches of a film whose octave is not sure."""
+    return [
+        f"from {frame / FRAME_RATE:.1f} s on the camera shows a part of the keyboard whose octave "
+        f"is a guess: its lowest C is taken for C{keyboard.lowest_c}"
+        for frame, keyboard in view.guessed
+    ]
+
+
+def on_unseen_keyboard(missing: NDArray[np.bool_]) -> list[str]:
+    """Remarks on intervals in which no keyboard is seen.
+
+    Args:
+        missing: (T,) bool, frames in which it is not.
+    """
+    return [
+        f"no keyboard is seen from {first:.1f} s to {end:.1f} s: that is left out"
+        for first, end in intervals(missing)
+    ]
 
 
 def on_missing_hands(tracks: HandTracks) -> list[str]:

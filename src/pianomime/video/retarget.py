@@ -23,16 +23,15 @@ from pianomime.transcription.recording import Recording
 from pianomime.transcription.transcribe import transcribe
 from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
-from pianomime.video.film.background import background
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.detector import HandDetector, check_mediapipe
 from pianomime.video.hands.model import find_hand_model
 from pianomime.video.hands.sightings import Sightings
 from pianomime.video.hands.tracks import HandTracks, follow
-from pianomime.video.keyboard.keyboard import find_keyboards
-from pianomime.video.keyboard.plane import Plane
 from pianomime.video.keyboard.points import NamedPoints, read_points
+from pianomime.video.keyboard.track import KeyboardTrack
+from pianomime.video.keyboard.views import View, find_views, view_of_points
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.offset import Offset, estimate_offset
@@ -86,7 +85,7 @@ class Retargeted:
     Attributes:
         demonstration: the result.
         film: the video.
-        plane: plane of the keyboard in its pictures.
+        track: of the keyboard in its pictures.
         tracks: the tracked hands.
         fingers: the finger that plays each note.
         remarks: what a user should know, one line each.
@@ -94,7 +93,7 @@ class Retargeted:
 
     demonstration: Demonstration
     film: Film
-    plane: Plane
+    track: KeyboardTrack
     tracks: HandTracks
     fingers: NoteFingers
     remarks: list[str]
@@ -122,8 +121,7 @@ def retarget(
     given = _Given.read(video, config, listener)
     if config.notes == "sound":
         given = replace(given, score=given.heard(progress))
-    progress("keyboard", 0, 0)
-    views = _find_views(given)
+    views = _find_views(given, progress)
     seen = _watch(given, views, progress)
     timed = seen.timed
     # Worked on in place: these become the plan.
@@ -148,9 +146,9 @@ def retarget(
         **timed.facts,
         "remarks": remarks,
     }
-    homography = seen.view.plane.zoomed(given.film.zoom).matrix
+    homography = seen.view.track.usual.zoomed(given.film.zoom).matrix
     demonstration = Demonstration(timed.score, plan, shown(video.name), homography, quality)
-    return Retargeted(demonstration, given.film, seen.view.plane, seen.tracks, fingers, remarks)
+    return Retargeted(demonstration, given.film, seen.view.track, seen.tracks, fingers, remarks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,14 +208,6 @@ class _Given:
         assert self.recording is not None
         return transcribe(self.recording, self.listener, progress)
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of the pictures as they are read [pixels]."""
-        return (
-            round(self.film.width / self.film.zoom),
-            round(self.film.height / self.film.zoom),
-        )
-
 
 def _recording(video: Path, config: RetargetConfig) -> Recording | None:
     """The sound of the video, where it is wanted.
@@ -233,21 +223,6 @@ def _recording(video: Path, config: RetargetConfig) -> Recording | None:
         if config.notes == "sound":
             raise
         return None
-
-
-@dataclass(frozen=True, eq=False)
-class _View:
-    """A way to see the keyboard in the video: its plane, and a line for the user.
-
-    Attributes:
-        plane: from pixels of the pictures as they are read to the world.
-        description: one line.
-        guessed: what the video leaves open, and notes may decide, one line each.
-    """
-
-    plane: Plane
-    description: str
-    guessed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,40 +254,23 @@ class _Taken(NamedTuple):
 class _Seen:
     """What one pass over the video showed, in the best view."""
 
-    view: _View
+    view: View
     tracks: HandTracks
     timed: _Timed
     remarks: list[str]
 
 
-def _find_views(given: _Given) -> list[_View]:
-    """The ways to see the keyboard, the likeliest first: one, or one for each possible octave."""
-    film = given.film
+def _find_views(given: _Given, progress: Progress) -> list[View]:
+    """The ways to see the keyboard in the video, the likeliest first."""
     if given.points is not None:
-        return [_View(given.points.plane.zoomed(1 / film.zoom), given.points.describe())]
+        return [view_of_points(given.points, given.film)]
     config = given.config
-    keyboards = find_keyboards(background(film), config.octave, config.mirrored)
-    if not keyboards:
-        raise InputError(f"{film.path}: {_not_found(config)}")
-    guessed = tuple(remark.on_naming(keyboards))
-    if given.score is None and not given.may_listen:
-        # Only notes can decide what is open, so the likeliest is assumed.
-        keyboards = keyboards[:1]
-    return [_View(keyboard.plane, keyboard.describe(), guessed) for keyboard in keyboards]
+    views = find_views(given.film, _MOST_FRAMES, config.octave, config.mirrored, progress)
+    # Only notes can decide what is open; without them the likeliest is assumed.
+    return views if given.score is not None or given.may_listen else views[:1]
 
 
-def _not_found(config: RetargetConfig) -> str:
-    """What to do where no keyboard is found."""
-    told = [f"--octave {config.octave}"] if config.octave is not None else []
-    if config.mirrored is not None:
-        told.append("--mirrored" if config.mirrored else "--not-mirrored")
-    where = "mark where it is with `pianomime pick`"
-    if told:
-        return f"no keyboard found that agrees with {' '.join(told)}; give another, or {where}"
-    return f"no keyboard found; {where}"
-
-
-def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
+def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
     """Read the video once: hands, keys, and from these the best view and the score."""
     with ExitStack() as records:
         lights = [records.enter_context(LightRecord(len(ZONES))) for _ in views]
@@ -324,25 +282,31 @@ def _watch(given: _Given, views: list[_View], progress: Progress) -> _Seen:
             taken = _from_score(given, given.score, views, sightings, lights)
         del sightings  # in hours of video, they take much memory
         view, light, tracks = views[taken.view], lights[taken.view], taken.tracks
-        remarks = [*taken.guessed, *remark.on_missing_hands(tracks), *remark.on_keyboard(light)]
+        remarks = [
+            *taken.guessed,
+            *remark.on_stretches(view),
+            *remark.on_unseen_keyboard(view.track.missing(len(tracks))),
+            *remark.on_missing_hands(tracks),
+            *remark.on_keyboard(light),
+        ]
         if len(tracks) == _MOST_FRAMES:
             remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
     return _Seen(view, tracks, taken.timed, remarks)
 
 
 def _detect(
-    given: _Given, views: list[_View], lights: list[LightRecord], progress: Progress
+    given: _Given, views: list[View], lights: list[LightRecord], progress: Progress
 ) -> Sightings:
     """Detect the hands in each frame and record the light of the keys, in one pass."""
     film = given.film
-    readers = [KeyLight(view.plane, given.size) for view in views]
+    readers = [KeyLight(view.track, given.film.working_size) for view in views]
     sightings = Sightings()
     total = round(film.seconds * FRAME_RATE)
     with HandDetector(given.hand_model) as detector:
         for number, frame in enumerate(islice(film.frames(FRAME_RATE), _MOST_FRAMES)):
             sightings.append(detector.detect(frame.picture, round(number * 1000 / FRAME_RATE)))
             for reader, light in zip(readers, lights, strict=True):
-                light.append(reader.read(frame.picture))
+                light.append(reader.read(number, frame.picture))
             progress("hands", number + 1, max(total, number + 1))
     return sightings
 
@@ -350,7 +314,7 @@ def _detect(
 def _from_score(
     given: _Given,
     score: Score,
-    views: list[_View],
+    views: list[View],
     sightings: Sightings,
     lights: list[LightRecord],
 ) -> _Taken:
@@ -358,7 +322,7 @@ def _from_score(
     best: tuple[int, HandTracks, Offset] | None = None
     most = math.inf if given.config.midi is not None else _LATE_SOUND
     for number, (view, light) in enumerate(zip(views, lights, strict=True)):
-        tracks = follow(sightings, given.size, view.plane)
+        tracks = follow(sightings, given.film.working_size, view.track)
         offset = estimate_offset(score, tracks, light, given.config.offset, most)
         if best is None or offset.touched > best[2].touched + _BETTER:
             best = number, tracks, offset
@@ -370,18 +334,18 @@ def _from_score(
 
 def _from_video(
     given: _Given,
-    views: list[_View],
+    views: list[View],
     sightings: Sightings,
     lights: list[LightRecord],
     progress: Progress,
 ) -> _Taken:
     """The notes of keys that light up, or else of the sound."""
     view = views[0]
-    tracks = follow(sightings, given.size, view.plane)
+    tracks = follow(sightings, given.film.working_size, view.track)
     _check_hands(given, tracks)
     read = read_notes(lights[0], tracks, title_of(given.film.path))
     if read.lit:
-        return _Taken(0, tracks, _read_score(read), view.guessed)
+        return _Taken(0, tracks, _read_score(read), tuple(remark.on_naming(view.namings)))
     advice = "give that with --midi FILE"
     if given.may_listen:
         try:

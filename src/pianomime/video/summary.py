@@ -117,7 +117,7 @@ def _pictures(made: Retargeted) -> list[NDArray[np.uint8]]:
     finger_key = made.demonstration.plan.finger_key
     count = min(len(finger_key), len(made.tracks))
     busy = (finger_key[:count] >= 0).sum(axis=(1, 2))
-    drawing = Drawing(made.plane)
+    drawing = Drawing(made.track)
     drawn = []
     for part in np.array_split(np.arange(count), _PICTURES):
         if not len(part):
@@ -126,7 +126,7 @@ def _pictures(made: Retargeted) -> list[NDArray[np.uint8]]:
         frame = next(made.film.frames(FRAME_RATE, number), None)
         if frame is not None:
             points, found = made.tracks.points[number], made.tracks.found[number]
-            drawn.append(drawing.draw(frame.picture, points, found, finger_key[number]))
+            drawn.append(drawing.draw(number, frame.picture, points, found, finger_key[number]))
     return drawn
 
 

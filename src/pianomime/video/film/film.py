@@ -83,6 +83,11 @@ class Film:
             self.seconds = _length(container, stream)
             self._interval = 1 / float(stream.average_rate or stream.guessed_rate or _USUAL_RATE)
 
+    @property
+    def working_size(self) -> tuple[int, int]:
+        """Width and height of the pictures that are returned [pixels]."""
+        return round(self.width / self.zoom), round(self.height / self.zoom)
+
     def frames(self, rate: float, first: int = 0) -> Iterator[Frame]:
         """The frames nearest to n / rate seconds for n = first, first + 1, ... to the end.
 

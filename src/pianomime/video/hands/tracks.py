@@ -19,7 +19,7 @@ from pianomime.plan import LEFT, RIGHT
 from pianomime.short_repr import short_repr
 from pianomime.video.hands.repair import repair
 from pianomime.video.hands.sightings import Sighting, Sightings
-from pianomime.video.keyboard.plane import Plane
+from pianomime.video.keyboard.track import KeyboardTrack
 
 _SAME_HAND = 0.05
 """[m] Two detections whose points are closer than this on average are one hand detected twice."""
@@ -88,18 +88,22 @@ def nobody(frames: int) -> HandTracks:
 
 
 def follow(
-    sightings: Iterable[Iterable[Sighting]], size: tuple[int, int], plane: Plane
+    sightings: Iterable[Iterable[Sighting]], size: tuple[int, int], track: KeyboardTrack
 ) -> HandTracks:
     """Track both hands over the whole video.
 
     Args:
         sightings: hands detected in each frame, at 20 Hz, in shares of the picture's size.
         size: width and height of the picture [pixels].
-        plane: plane of the keyboard in that picture.
+        track: of the keyboard; hands are not followed where it is not seen.
     """
     seen = Sightings()
     doubles = 0
-    for frame in sightings:
+    for number, frame in enumerate(sightings):
+        plane = track.at(number)
+        if plane is None:
+            seen.append([])
+            continue
         hands = [Sighting(plane.to_world(each.points * size), each.right) for each in frame]
         single = _without_doubles(hands)
         doubles += len(hands) - len(single)

@@ -13,6 +13,7 @@ from pianomime.keyboard import BLACK, KEYS
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.keyboard.plane import Plane
+from pianomime.video.keyboard.track import KeyboardTrack
 from pianomime.video.notes.touch import touching
 from pianomime.world.parameters import key_centres
 
@@ -38,36 +39,56 @@ _HALF_WIDTH = np.where(BLACK, 0.004, 0.006)
 
 
 class KeyLight:
-    """Reads the patches of all keys in pictures of a camera that does not move."""
+    """Reads the patches of all keys in the frames of a film.
 
-    def __init__(self, plane: Plane, size: tuple[int, int]) -> None:
-        """Find the pixels of all patches.
+    What a camera that moves does not show stays as it was seen last.
+    """
+
+    def __init__(self, track: KeyboardTrack, size: tuple[int, int]) -> None:
+        """Begin at the first frame.
 
         Args:
-            plane: plane of the keyboard in the pictures.
+            track: of the keyboard.
             size: width and height of the pictures [pixels].
         """
+        self._track, self._size = track, np.array(size)
+        self._last = np.zeros((len(ZONES), KEYS, 3))
+        self._plane: Plane | None = None
+        for picture, plane in reversed(track.backgrounds):
+            self._read(picture, plane)
+
+    def read(self, frame: int, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Mean colour of each patch.
+
+        Args:
+            frame: number of the frame; each is read once, in order.
+            picture: (height, width, 3) uint8.
+
+        Returns:
+            (zones, 88, 3) uint8; black where it has never been in the picture.
+        """
+        plane = self._track.at(frame)
+        if plane is not None:
+            self._read(picture, plane)
+        return self._last.astype(np.uint8)
+
+    def _read(self, picture: NDArray[np.uint8], plane: Plane) -> None:
+        if plane is not self._plane:
+            self._aim(plane)
+        patches = picture[self._row, self._column].mean(axis=2)
+        self._last = np.where(self._inside[..., None], patches, self._last)
+
+    def _aim(self, plane: Plane) -> None:
+        """Find the pixels of all patches."""
+        self._plane = plane
         along = np.array([np.linspace(*zone, 4) for zone in ZONES.values()])
         beside = np.linspace(-1, 1, 3)[None, :] * _HALF_WIDTH[:, None] + key_centres()[:, 1:2]
         world = np.stack(
             np.broadcast_arrays(along[:, None, :, None], beside[None, :, None, :]), axis=-1
         )
         places = np.floor(plane.to_pixels(world)).astype(np.int64).reshape(len(ZONES), KEYS, -1, 2)
-        inside = np.asarray(((places >= 0) & (places < size)).all(axis=(2, 3)))
-        self._column, self._row = np.moveaxis(np.clip(places, 0, np.array(size) - 1), -1, 0)
-        self._inside = inside
-
-    def read(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Mean colour of each patch.
-
-        Args:
-            picture: (height, width, 3) uint8.
-
-        Returns:
-            (zones, 88, 3) uint8; black outside the picture.
-        """
-        patches = picture[self._row, self._column].mean(axis=2)
-        return np.where(self._inside[..., None], patches, 0).astype(np.uint8)
+        self._inside = np.asarray(((places >= 0) & (places < self._size)).all(axis=(2, 3)))
+        self._column, self._row = np.moveaxis(np.clip(places, 0, self._size - 1), -1, 0)
 
 
 def unattended(tracks: HandTracks) -> NDArray[np.bool_]:
