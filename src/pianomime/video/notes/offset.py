@@ -18,6 +18,12 @@ from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.notes.key_light import LIT, Glow, unattended
 from pianomime.video.notes.touch import touching
 
+LATE_SOUND, LATEST_SOUND = 0.5, 3.0
+"""[s] Most by which the sound of a video usually is before or after its pictures, and at all."""
+
+_UNUSUAL = 0.8
+"""Weight of the evidence for an unusual offset: music is much like itself some beats later."""
+
 _MATCH = 0.7
 """Least share of notes with a finger on their key for a MIDI file to be what is played."""
 _ABOVE_CHANCE = 0.15
@@ -51,6 +57,7 @@ def estimate_offset(
     tracks: HandTracks,
     light: LightRecord,
     given: float | None = None,
+    usual: float = np.inf,
     most: float = np.inf,
 ) -> Offset:
     """Find the offset at which the score fits the video best.
@@ -60,6 +67,7 @@ def estimate_offset(
         tracks: the tracked hands.
         light: colours of the keys in each frame, see `KeyLight`.
         given: the offset [s], if it is known; then only its fit is measured.
+        usual: how far from 0 it usually is [s]; beyond that, the evidence must be clear.
         most: how far from 0 it may be [s].
     """
     points, away = tracks.seen_points(), unattended(tracks)
@@ -76,20 +84,22 @@ def estimate_offset(
 
     touched = mean(lambda key: touching(points, key) > np.exp(-1.0))
     evidence = mean(lambda key: touching(points, key))
-    best_light, best_peak = np.zeros(len(lags)), 0.0
-    for zone, colourful in product(LIT, (True, False)):
-        rise = partial(_rise, Glow(light, away, zone, colourful))
-        found = mean(rise)
-        peak = float(found.max() - np.median(found))
-        if peak > best_peak:
-            best_light, best_peak = found, peak
-    total = evidence + best_light
     length = score.onset.max() * FRAME_RATE - score.onset.min() * FRAME_RATE
     first = lags + score.onset.min() * FRAME_RATE
     together = np.minimum(first + length, len(points)) - np.maximum(first, 0)
     possible = (together >= _INSIDE * min(length, len(points))) & (counts > 0)
+    best_light, best_peak = np.zeros(len(lags)), 0.0
+    for zone, colourful in product(LIT, (True, False)):
+        rise = partial(_rise, Glow(light, away, zone, colourful))
+        found = mean(rise)
+        # Where few notes are in the video, one of them makes a peak.
+        peak = float(found[possible].max(initial=0.0) - np.median(found))
+        if peak > best_peak:
+            best_light, best_peak = found, peak
+    total = evidence + best_light
     # Music repeats itself, so a good fit of many notes is better evidence than one of few.
     sure = (total - np.median(total[possible])) * np.sqrt(counts)
+    sure *= np.where(np.abs(lags) <= usual * FRAME_RATE, 1.0, _UNUSUAL)
     open_lags = possible & (np.abs(lags) <= most * FRAME_RATE)
     # Where the music is hardly in the video, no offset is better than none.
     at = int(np.argmax(np.where(open_lags, sure, -np.inf)) if open_lags.any() else -lags[0])
