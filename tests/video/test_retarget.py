@@ -18,7 +18,7 @@ from pianomime import cli
 from pianomime.errors import InputError
 from pianomime.file_names import file_name
 from pianomime.keyboard import NO_KEY
-from pianomime.music import onset_f1
+from pianomime.music import Score, onset_f1
 from pianomime.plan.demonstration import Demonstration
 from pianomime.shown import shown
 from pianomime.transcription import listener as listening
@@ -153,22 +153,86 @@ def test_notes_of_the_sound(unlit, hands, score, notes):
     np.testing.assert_allclose(made.demonstration.score.onset, score.onset, atol=0.05)
 
 
-def test_light_is_taken_where_keys_light_up(video, hands, tmp_path, monkeypatch):
-    """As without a listener, bit for bit; nobody listens."""
+def test_where_nobody_can_listen_light_says_it_all(video, hands, tmp_path, monkeypatch):
+    """As without a sound, and as with `light`, bit for bit."""
     loud = with_sound(video, tmp_path / "made-up.mp4", delay=0.0, begins=0.0)
+    monkeypatch.setattr(room, "can_listen", lambda: False)
     monkeypatch.setattr(room, "transcribe", lambda *_: pytest.fail("listened"))
     config = RetargetConfig(hand_model=hands)
-    for name, listener in (("with", Teller(made_up.song(5.0))), ("without", None)):
-        retarget(loud, config, listener=listener).demonstration.save(tmp_path / f"{name}.npz")
-    retarget(loud, replace(config, notes="light")).demonstration.save(tmp_path / "light.npz")
-    with_, without, light = (
-        Demonstration.load(tmp_path / f"{name}.npz") for name in ("with", "without", "light")
+    for name, film, listener, notes in (
+        ("sound", loud, None, "auto"),
+        ("silent", video, Teller(made_up.song(5.0)), "auto"),
+        ("light", loud, Teller(made_up.song(5.0)), "light"),
+    ):
+        made = retarget(film, replace(config, notes=notes), listener=listener)
+        made.demonstration.save(tmp_path / f"{name}.npz")
+    sound, silent, light = (
+        Demonstration.load(tmp_path / f"{name}.npz") for name in ("sound", "silent", "light")
     )
-    assert with_.quality == without.quality == light.quality
-    assert with_.quality["notes_from"] == "video, from keys that light up"
-    for other in (without, light):
-        np.testing.assert_array_equal(with_.score.onset, other.score.onset)
-        np.testing.assert_array_equal(with_.plan.fingertips, other.plan.fingertips)
+    assert sound.quality == silent.quality == light.quality
+    assert sound.quality["notes_from"] == "video, from keys that light up"
+    for other in (silent, light):
+        np.testing.assert_array_equal(sound.score.onset, other.score.onset)
+        np.testing.assert_array_equal(sound.plan.fingertips, other.plan.fingertips)
+
+
+def test_light_and_sound(video, hands, tmp_path, score):
+    """Keys are from the light, touch and pedal from the sound, which is late and has a ghost."""
+    loud = with_sound(video, tmp_path / "made-up.mp4", delay=0.0, seconds=6.0, begins=0.0)
+    velocity = np.arange(len(score)) % 90 + 20
+    heard = Score(
+        np.append(score.key, score.key[0] + 24),
+        np.append(score.onset, score.onset[0]) + 0.8,
+        np.append(score.offset, score.offset[0]) + 0.8,
+        np.append(velocity, 30),
+        np.array([[1.8, 2.8]]),
+    )
+    made = retarget(loud, RetargetConfig(hand_model=hands), listener=Teller(heard))
+    light = retarget(loud, RetargetConfig(hand_model=hands, notes="light")).demonstration.score
+    fused, quality = made.demonstration.score, made.demonstration.quality
+    np.testing.assert_array_equal(np.sort(fused.key), np.sort(light.key))
+    assert quality["notes_from"] == "video, from keys that light up, and its sound"
+    assert quality["notes_only_heard"] == len(heard) - quality["notes_seen_and_heard"]
+    assert quality["notes_seen_and_heard"] > 0.95 * len(light)
+    assert quality["offset_seconds"] == pytest.approx(-0.8, abs=0.05)
+    np.testing.assert_allclose(fused.pedal, [[1.0, 2.0]], atol=0.05)
+    assert set(np.unique(fused.velocity)) <= set(velocity) | {round(float(np.median(velocity)))}
+    assert any("notes are seen and heard" in remark for remark in made.remarks)
+    assert any("the sound is 0.8" in remark and "later" in remark for remark in made.remarks)
+
+
+@pytest.mark.parametrize("begins", [0.0, 9.0], ids=["of something else", "silent"])
+def test_light_alone_where_the_sound_is_of_no_help(video, hands, tmp_path, score, begins):
+    film = with_sound(video, tmp_path / "made-up.mp4", delay=0.0, seconds=5.0, begins=begins)
+    made = retarget(film, RetargetConfig(hand_model=hands), listener=Teller(score.transpose(23)))
+    assert made.demonstration.quality["notes_from"] == "video, from keys that light up"
+    assert sum("the sound is of no help" in remark for remark in made.remarks) == 1
+
+
+def test_a_sound_that_is_late(unlit, hands, score):
+    heard = replace(score, onset=score.onset + 1.0, offset=score.offset + 1.0)
+    made = retarget(unlit, RetargetConfig(hand_model=hands, notes="sound"), listener=Teller(heard))
+    # Where keys do not even move, fingers alone tell when, to two frames.
+    assert made.demonstration.quality["offset_seconds"] == pytest.approx(-1.0, abs=0.1)
+    assert any(
+        "later than the pictures" in remark and "--offset" in remark for remark in made.remarks
+    )
+
+
+def test_heard_notes_that_no_hand_played(unlit, hands, score):
+    """A harmonic is left out, another note is kept, and both are told and counted."""
+    key, onset = score.key.max(), score.onset[np.argmax(score.key)]
+    heard = Score(
+        np.append(score.key, [key + 24, 80]),
+        np.append(score.onset, [onset, 3.1]),
+        np.append(score.offset, [onset + 0.2, 3.3]),
+        np.append(score.velocity, [60, 60]),
+    )
+    made = retarget(unlit, RetargetConfig(hand_model=hands, notes="sound"), listener=Teller(heard))
+    quality = made.demonstration.quality
+    assert (quality["notes_doubted"], quality["notes_left_out"]) == (1, 1)
+    assert len(made.demonstration.score) == len(score) + 1
+    assert any(remark.startswith("1 notes that are heard are left out") for remark in made.remarks)
 
 
 def test_a_sound_of_something_else_is_of_no_help(unlit, hands, score):

@@ -35,7 +35,8 @@ class Retarget:
     notes: Literal["auto", "midi", "light", "sound"] = "auto"
     """What the notes are taken from: the MIDI file, keys that light up, or the sound of
     the video. By default the MIDI file if there is one, else light where keys light up, else sound
-    where the extra `audio` is installed."""
+    where the extra `audio` is installed; where there is light, sound adds time, velocity and
+    pedal."""
     points: Annotated[Path | None, tyro.conf.arg(metavar="POINTS.json", help_behavior_hint="")] = (
         None
     )
@@ -47,8 +48,8 @@ class Retarget:
     not_mirrored: tyro.conf.FlagCreatePairsOff[bool] = False
     """The video is not mirrored."""
     offset: Annotated[float | None, tyro.conf.arg(metavar="S", help_behavior_hint="")] = None
-    """When the MIDI file begins in the video [s], negative if before it; or how late its own sound
-    is. By default estimated."""
+    """When the MIDI file begins in the video [s], negative if before it; or how early its own sound
+    is, negative if late. By default estimated."""
     hand_model: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """MediaPipe's hand_landmarker.task; by default downloaded once."""
     align: Literal["steady", "paper"] = "steady"

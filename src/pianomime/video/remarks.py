@@ -16,8 +16,10 @@ from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.keyboard.keyboard import Keyboard
 from pianomime.video.keyboard.views import View
 from pianomime.video.notes.fingers import NoteFingers
+from pianomime.video.notes.fusion import Fused
+from pianomime.video.notes.heard import Checked
 from pianomime.video.notes.key_light import ZONES
-from pianomime.video.notes.offset import Offset
+from pianomime.video.notes.offset import LATE_SOUND, Offset
 
 _SHORTEST = 0.5
 """[s] Shorter intervals are not reported."""
@@ -151,12 +153,75 @@ def on_sound(offset: Offset) -> list[str]:
     Args:
         offset: where its notes lie in the video.
     """
-    if offset.matches:
+    remarks = on_late_sound(-offset.seconds)
+    if not offset.matches:
+        remarks.append(
+            f"the sound may not be of what is seen: {offset.touched:.0%} of its notes have a "
+            f"finger on their key, {offset.by_chance:.0%} would by chance"
+        )
+    return remarks
+
+
+def on_late_sound(late: float) -> list[str]:
+    """Remarks on a sound that is not in time with its pictures.
+
+    Args:
+        late: how much later it is [s].
+    """
+    if abs(late) <= LATE_SOUND:
         return []
+    when = "later" if late > 0 else "earlier"
     return [
-        f"the sound may not be of what is seen: {offset.touched:.0%} of its notes have a finger on "
-        f"their key, {offset.by_chance:.0%} would by chance"
+        f"the sound is {abs(late):.2f} s {when} than the pictures, by the notes in both: its notes "
+        f"are moved there; if that is wrong, give --offset {-late:.2f} another value"
     ]
+
+
+def on_heard(checked: Checked) -> list[str]:
+    """Remarks on notes of the sound that hands cannot have played.
+
+    Args:
+        checked: notes that were compared with the hands.
+    """
+    remarks = []
+    if checked.left_out:
+        remarks.append(
+            f"{checked.left_out} notes that are heard are left out: no finger is near their key, "
+            "and each is a harmonic of a louder one at the same time"
+        )
+    if checked.doubted:
+        remarks.append(
+            f"{checked.doubted} of {len(checked.score)} notes that are heard have no finger near "
+            "their key when they begin, though both hands are seen: they are kept, and doubtful"
+        )
+    return remarks
+
+
+def on_fused(fused: Fused) -> list[str]:
+    """Remarks on how the notes that are seen and those that are heard agree.
+
+    Args:
+        fused: what became of both.
+    """
+    seen, heard = fused.both + fused.only_seen, fused.both + fused.only_heard
+    if not fused.alike:
+        return on_unused_sound(
+            f"{fused.both} of {seen} notes that are seen are among the {heard} that are heard"
+        )
+    return [
+        *on_late_sound(fused.late),
+        f"{fused.both} of {seen} notes are seen and heard; {fused.only_seen} only seen are kept, "
+        f"{fused.only_heard} only heard are left out",
+    ]
+
+
+def on_unused_sound(why: str) -> list[str]:
+    """Remarks on a sound that says nothing about the notes that are seen.
+
+    Args:
+        why: how that shows.
+    """
+    return [f"the notes are those that are seen; the sound is of no help: {why}"]
 
 
 def on_midi(midi: str, score: Score, offset: Offset, seconds: float) -> list[str]:

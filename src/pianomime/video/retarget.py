@@ -33,8 +33,10 @@ from pianomime.video.keyboard.points import NamedPoints, read_points
 from pianomime.video.keyboard.track import KeyboardTrack
 from pianomime.video.keyboard.views import View, find_views, view_of_points
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
+from pianomime.video.notes.fusion import fuse
+from pianomime.video.notes.heard import check_heard
 from pianomime.video.notes.key_light import ZONES, KeyLight
-from pianomime.video.notes.offset import Offset, estimate_offset
+from pianomime.video.notes.offset import LATE_SOUND, LATEST_SOUND, Offset, estimate_offset
 from pianomime.video.notes.reading import ReadNotes, read_notes
 from pianomime.video.parallax import correct_parallax
 
@@ -46,8 +48,6 @@ _FEW_TOUCHED = 0.7
 """Share of notes with a finger on their key below which notes read from a video are doubtful."""
 _BETTER = 0.02
 """Share of notes by which a less likely octave must have more fingers on keys to be chosen."""
-_LATE_SOUND = 0.5
-"""[s] Most by which the sound of a video is before or after its pictures."""
 
 Notes = Literal["auto", "midi", "light", "sound"]
 """What the notes are taken from, see `RetargetConfig.notes`."""
@@ -66,7 +66,7 @@ class RetargetConfig:
     mirrored: bool | None = None
     """Whether the video is mirrored; by default it is found out."""
     offset: float | None = None
-    """Time in the video at which the MIDI file begins, or by which its own sound is late [s]; by
+    """Time in the video at which the MIDI file begins, or by which its own sound is early [s]; by
     default it is estimated."""
     hand_model: Path | None = None
     """MediaPipe's hand_landmarker.task; by default it is downloaded once."""
@@ -75,7 +75,8 @@ class RetargetConfig:
     notes: Notes = "auto"
     """What the notes are taken from: `midi`; `light`, that is, keys that light up; or the `sound`
     of the video. `auto` is the MIDI file if there is one, else light where keys light up, else
-    sound where the extra `audio` is installed and a piano is heard."""
+    sound where the extra `audio` is installed and a piano is heard. Where there are both light and
+    sound, `auto` takes keys from light and time, velocity and pedal from sound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,17 +320,28 @@ def _from_score(
     lights: list[LightRecord],
 ) -> _Taken:
     """The notes of a MIDI file or of the sound, in the view in which most have a finger on them."""
+    heard = given.config.midi is None
+    limits = (LATE_SOUND, LATEST_SOUND) if heard else (math.inf, math.inf)
     best: tuple[int, HandTracks, Offset] | None = None
-    most = math.inf if given.config.midi is not None else _LATE_SOUND
     for number, (view, light) in enumerate(zip(views, lights, strict=True)):
         tracks = follow(sightings, given.film.working_size, view.track)
-        offset = estimate_offset(score, tracks, light, given.config.offset, most)
+        offset = estimate_offset(score, tracks, light, given.config.offset, *limits)
         if best is None or offset.touched > best[2].touched + _BETTER:
             best = number, tracks, offset
     assert best is not None
     number, tracks, offset = best
     _check_hands(given, tracks)
-    return _Taken(number, tracks, _place(given, score, offset, len(tracks) / FRAME_RATE))
+    timed = _place(given, score, offset, len(tracks) / FRAME_RATE)
+    return _Taken(number, tracks, _checked(timed, tracks) if heard else timed)
+
+
+def _checked(timed: _Timed, tracks: HandTracks) -> _Timed:
+    """Notes of the sound without those that no hand can have played."""
+    checked = check_heard(timed.score, tracks)
+    facts = {"notes_doubted": checked.doubted, "notes_left_out": checked.left_out}
+    return _Timed(
+        checked.score, {**timed.facts, **facts}, [*timed.remarks, *remark.on_heard(checked)]
+    )
 
 
 def _from_video(
@@ -339,13 +351,16 @@ def _from_video(
     lights: list[LightRecord],
     progress: Progress,
 ) -> _Taken:
-    """The notes of keys that light up, or else of the sound."""
+    """The notes of keys that light up, with what the sound says of them; or else of the sound."""
     view = views[0]
     tracks = follow(sightings, given.film.working_size, view.track)
     _check_hands(given, tracks)
     read = read_notes(lights[0], tracks, title_of(given.film.path))
     if read.lit:
-        return _Taken(0, tracks, _read_score(read), tuple(remark.on_naming(view.namings)))
+        timed = _read_score(read)
+        if given.may_listen:
+            timed = _fused(given, timed, progress)
+        return _Taken(0, tracks, timed, tuple(remark.on_naming(view.namings)))
     advice = "give that with --midi FILE"
     if given.may_listen:
         try:
@@ -379,6 +394,29 @@ def _read_score(read: ReadNotes) -> _Timed:
         "notes_touched": round(read.touched, 4),
     }
     return _Timed(on_grid(read.score), facts, remarks)
+
+
+def _fused(given: _Given, timed: _Timed, progress: Progress) -> _Timed:
+    """The notes of keys that light up, with what the sound says of them where it is theirs."""
+    try:
+        heard = given.heard(progress)
+    except InputError as error:
+        said = remark.on_unused_sound(f"{error}".removeprefix(f"{given.film.path}: "))
+        return _Timed(timed.score, timed.facts, [*timed.remarks, *said])
+    early = given.config.offset
+    fused = fuse(timed.score, heard, None if early is None else -early)
+    remarks = [*timed.remarks, *remark.on_fused(fused)]
+    if not fused.alike:
+        return _Timed(timed.score, timed.facts, remarks)
+    facts = {
+        **timed.facts,
+        "notes_from": "video, from keys that light up, and its sound",
+        "offset_seconds": round(-fused.late, 4),
+        "notes_seen_and_heard": fused.both,
+        "notes_only_seen": fused.only_seen,
+        "notes_only_heard": fused.only_heard,
+    }
+    return _Timed(on_grid(fused.score), facts, remarks)
 
 
 def _place(given: _Given, score: Score, offset: Offset, seconds: float) -> _Timed:

@@ -37,7 +37,7 @@ _CROSSED = 1.0
 """Cost of two fingers of one hand out of order along the keyboard."""
 _THUMB_UNDER = 0.3
 """Cost of two fingers out of order if one of them is the thumb."""
-_ELSEWHERE = 9.0
+ELSEWHERE = 9.0
 """Misfit, that of a finger two keys away, beyond which the finger of a note is only a guess."""
 
 
@@ -62,7 +62,7 @@ class NoteFingers:
     @property
     def guessed(self) -> NDArray[np.bool_]:
         """(N,) bool: notes whose finger was not seen on or beside the key."""
-        return self.misfit > _ELSEWHERE
+        return self.misfit > ELSEWHERE
 
 
 def find_note_fingers(
