@@ -57,7 +57,7 @@ VIDEO = (
     ("notes",),
     ("align", "parallax", "drawing", "remarks"),
     ("lit_film", "retarget"),
-    ("overlay", "summary"),
+    ("overlay", "recording_notes", "summary"),
 )
 
 LEARN_ONLY = ("torch", "stable_baselines3", "diffusers", "accelerate", "gymnasium", "ray")

@@ -51,9 +51,9 @@ class Play:
     """
 
     song: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="SONG")]
-    """A MIDI file, a demonstration (see `pianomime retarget`), a recording of a piano, which is
-    transcribed first (see `pianomime transcribe`), or the name of a bundled song (see `pianomime
-    songs`)."""
+    """A MIDI file, a demonstration (see `pianomime retarget`), a recording of a piano or a film of
+    falling notes, which are transcribed first (see `pianomime transcribe`), or the name of a
+    bundled song (see `pianomime songs`)."""
     out: Annotated[
         Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
     ] = None
@@ -100,7 +100,7 @@ class Play:
         if recording is not None:
             # Before the long work.
             casting.check_kind(path)
-            path = _transcribed(recording, out)
+            path = self._transcribed(recording, out)
         player, score = self._cast(casting, path)
         make_report(lambda progress: player.play(score, progress), out, self.video)
 
@@ -110,6 +110,17 @@ class Play:
 
         name = self.player or ("demonstration" if path.suffix == ".npz" else "zero-shot")
         return Casting.of(name, self.effort, self.seed, self.world, **self.settings)
+
+    def _transcribed(self, recording: Path, out: Path) -> Path:
+        """The transcription of what is played of a recording, beside the report."""
+        from pianomime.commands.transcribe import write_transcription
+        from pianomime.file_names import file_name
+        from pianomime.video.recording_notes import RecordingConfig
+
+        midi = out / f"{file_name(recording.stem)}-transcribed.mid"
+        config = RecordingConfig(start=self.start, seconds=self.seconds)
+        write_transcription(recording, midi, config)
+        return midi
 
     def _cast(self, casting: Casting, path: Path) -> tuple[Player, Score]:
         """Who plays what."""
@@ -130,13 +141,3 @@ class Play:
                         f"trained on, as it does: --{option} {value:g}"
                     )
         return player, score
-
-
-def _transcribed(recording: Path, out: Path) -> Path:
-    """The transcription of a recording, beside the report."""
-    from pianomime.commands.transcribe import write_transcription
-    from pianomime.file_names import file_name
-
-    midi = out / f"{file_name(recording.stem)}-transcribed.mid"
-    write_transcription(recording, midi)
-    return midi

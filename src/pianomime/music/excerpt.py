@@ -29,16 +29,29 @@ def excerpt(
     Raises:
         InputError: a time is out of range, or nothing sounds after `start`.
     """
-    if not seconds > 0:
-        raise InputError(f"seconds must be more than 0, not {seconds:g}")
-    if not 0 <= start < math.inf:
-        raise InputError(f"start must be 0 or more, not {start:g}")
+    check_part(start, seconds)
     if start and start >= score.duration:
         raise InputError(
             f"nothing to play from {start:g} s on: {score.title} lasts {score.duration:.1f} s"
         )
     check_lead_in(lead_in)
     return score.clip(start, math.inf).trim_silence().clip(0.0, seconds).delay(lead_in)
+
+
+def check_part(start: float, seconds: float) -> None:
+    """Refuse what is no part of any song.
+
+    Args:
+        start: where it begins [s].
+        seconds: its greatest length [s].
+
+    Raises:
+        InputError: a time is out of range.
+    """
+    if not seconds > 0:
+        raise InputError(f"seconds must be more than 0, not {seconds:g}")
+    if not 0 <= start < math.inf:
+        raise InputError(f"start must be 0 or more, not {start:g}")
 
 
 def check_lead_in(lead_in: float) -> None:

@@ -18,7 +18,8 @@ _MUSIC = {
     **dict.fromkeys(
         _VIDEO,
         "`pianomime retarget {file}` makes a demonstration of a video of a person who plays, "
-        "filmed from above, and `pianomime transcribe {file}` makes MIDI of its sound",
+        "filmed from above, and `pianomime transcribe {file}` makes MIDI of its sound, or of "
+        "keys that light up in it",
     ),
     **dict.fromkeys(
         _MUSESCORE + _GUITAR_PRO,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -78,16 +79,19 @@ class Recording:
             raise _too_long(path)
         return cls(Path(path), seconds, start)
 
-    def stretches(self, rate: int) -> Iterator[Stretch]:
+    def stretches(self, rate: int, until: float = math.inf) -> Iterator[Stretch]:
         """The whole sound, in order; each of its samples is one stretch's own.
 
         Args:
             rate: samples per second [Hz].
+            until: end of what is any stretch's own [s]; the last one goes on a little, as others
+                do. It may be after the end of the sound.
 
         Raises:
             InputError: the recording is longer than its header says, and too long.
         """
         own, lap = _OWN * rate, _LAP * rate
+        last = round(min(until, 2 * MAX_SECONDS) * rate)
         parts: list[NDArray[np.float32]] = []
         first, count, number = 0, 0, 0
         with open_media(self.path, "sound or a video that can be read") as container:
@@ -96,6 +100,8 @@ class Recording:
                 count += len(block)
                 if count > MAX_SECONDS * rate:
                     raise _too_long(self.path)
+                if count >= last + lap:
+                    break
                 while count >= (number + 1) * own + lap:
                     samples = np.concatenate(parts)
                     end = (number + 1) * own
@@ -107,7 +113,9 @@ class Recording:
                     parts = [samples[end - lap - first :]]
                     first, number = end - lap, number + 1
         samples = np.concatenate([np.empty(0, np.float32), *parts])
-        yield Stretch(samples, first / rate, (number * own - first, len(samples)))
+        samples = samples[: last + lap - first]
+        own_end = min(last - first, len(samples))
+        yield Stretch(samples, first / rate, (number * own - first, own_end))
 
 
 def _first_picture(container: Any) -> float | None:

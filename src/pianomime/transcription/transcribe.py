@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.music.excerpt import check_part
 from pianomime.music.score import Score
 from pianomime.progress import Progress, no_progress
 from pianomime.shown import title_of
@@ -20,12 +22,17 @@ _FEW, _RARE = 5, 0.2
 """Notes in all, and a second, below which there are hardly any."""
 _UNEXPLAINED = 0.3
 """Share of the loud time without a note from which something else is heard."""
+_SILENCE = 4.0
+"""[s] Silence before an excerpt for which no more than the excerpt has to be heard."""
 _TWICE = 0.03
 """[s] Two strikes of a key are further apart: nearer ones are one, heard in two stretches."""
 
 
 def transcribe(
-    recording: Recording, listener: Listener | None = None, progress: Progress = no_progress
+    recording: Recording,
+    listener: Listener | None = None,
+    progress: Progress = no_progress,
+    until: float = math.inf,
 ) -> Score:
     """Write down the notes of a recording of a piano.
 
@@ -33,6 +40,7 @@ def transcribe(
         recording: the recording.
         listener: who hears the notes; transkun if not given.
         progress: called in the phase "listening", with seconds.
+        until: end of the onsets that are wanted [s]; what comes later is not heard.
 
     Returns:
         The score, in the time of the recording, with its doubts as `remarks`.
@@ -41,13 +49,13 @@ def transcribe(
         InputError: the recording is silent, no notes are heard in it, or it cannot be read; or
             transkun is not installed.
     """
-    total = round(recording.seconds)
+    total = round(min(recording.seconds, until))
     progress("listening", 0, total)
     if listener is None:
         listener = find_listener()
     heard: list[Score] = []
     loudness: list[NDArray[np.float32]] = []
-    for stretch in recording.stretches(listener.rate):
+    for stretch in recording.stretches(listener.rate, until):
         first, stop = stretch.own
         loudness.append(loudness_of(stretch.samples[first:stop], listener.rate))
         if not (loudness[-1] > 0).any():
@@ -61,6 +69,44 @@ def transcribe(
     if not len(score):
         raise InputError(f"{recording.path}: no notes of a piano are heard in it")
     return replace(score, remarks=_doubts(score, whole))
+
+
+def transcribe_excerpt(
+    recording: Recording,
+    start: float,
+    seconds: float,
+    listener: Listener | None = None,
+    progress: Progress = no_progress,
+) -> Score:
+    """Write down as much of a recording as `excerpt` asks for, and perhaps more.
+
+    Args:
+        recording: the recording.
+        start: where the excerpt begins [s].
+        seconds: its length from the first note there on [s]; may be infinite.
+        listener: who hears the notes; transkun if not given.
+        progress: called in the phase "listening", with seconds.
+
+    Returns:
+        As `transcribe` does. It equals that of the whole recording to the end of the excerpt.
+
+    Raises:
+        InputError: as `transcribe` does; or a time is out of range.
+    """
+    check_part(start, seconds)
+    until = start + seconds + _SILENCE
+    if listener is None:
+        listener = find_listener()
+    if until < recording.seconds:
+        try:
+            score = transcribe(recording, listener, progress, until)
+        except InputError:
+            pass  # It may be silent there alone.
+        else:
+            sounding = score.onset[score.offset > start]
+            if len(sounding) and max(start, sounding[0]) + seconds <= until:
+                return score
+    return transcribe(recording, listener, progress)
 
 
 def _teller(progress: Progress, stretch: Stretch, total: int) -> Callable[[float], None]:

@@ -26,6 +26,8 @@ def notes_of_lit_film(
     video: str | os.PathLike[str],
     points: NamedPoints | None = None,
     progress: Progress = no_progress,
+    octave: int | None = None,
+    mirrored: bool | None = None,
 ) -> Score:
     """Read the notes of a film of falling notes, or of another one whose keys light up.
 
@@ -35,6 +37,8 @@ def notes_of_lit_film(
         video: a video of a keyboard from above.
         points: named points of the keyboard; by default it is found automatically.
         progress: called in the phases "keyboard", "keys" and "notes".
+        octave: of the lowest C that is seen, 4 for the middle C; by default it is found out.
+        mirrored: whether the film is; by default it is found out.
 
     Returns:
         The notes in the time of the film, all as loud, without pedal. If the film leaves the octave
@@ -48,7 +52,7 @@ def notes_of_lit_film(
     if film.seconds > MAX_SECONDS:
         raise InputError(f"{film.path}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
     if points is None:
-        view = find_views(film, most, None, None, progress)[0]
+        view = find_views(film, most, octave, mirrored, progress)[0]
     else:
         view = view_of_points(points, film)
     reader = KeyLight(view.track, film.working_size)
