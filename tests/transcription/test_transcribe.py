@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from made_up_listener import RATE, Teller, ramp, tone
 from pianomime import songs
@@ -19,7 +20,7 @@ from pianomime.music import Score, excerpt, music_metrics, render_audio, write_w
 from pianomime.transcription.listener import can_listen, check_listener
 from pianomime.transcription.loudness import PARTS, Loudness, loudness_of
 from pianomime.transcription.recording import Recording
-from pianomime.transcription.transcribe import transcribe
+from pianomime.transcription.transcribe import transcribe, transcribe_excerpt
 
 LONG = 1500.0
 """[s] Of three stretches."""
@@ -51,7 +52,8 @@ def test_what_is_heard_in_stretches_is_the_whole(tmp_path: Path) -> None:
     listener = Teller(said, ramp=True)
     heard = transcribe(Recording.of(ramp(tmp_path / "a song.wav", LONG)), listener)
     assert heard.title == "a song"
-    assert heard.remarks == ()
+    # The ramp is as loud at the end of notes as at their beginning.
+    assert [doubt[:27] for doubt in heard.remarks] == ["notes that are held stay as"]
     assert listener.lengths == [616.0, 632.0, 316.0]
     for name in ("key", "velocity"):
         np.testing.assert_array_equal(getattr(heard, name), getattr(said, name))
@@ -108,6 +110,82 @@ def test_hardly_any_notes_are_doubtful(tmp_path: Path) -> None:
         "hardly any notes are heard",
         "in 80% of the loud time no note is heard",
     ]
+
+
+def wave(path: Path, loud: NDArray[np.float64]) -> Path:
+    """A WAV file as loud as this, sample by sample."""
+    write_wav(path, loud[:, None] * np.sign(np.sin(np.arange(len(loud))))[:, None], RATE)
+    return path
+
+
+def held(seconds: float) -> Score:
+    """A note every two seconds."""
+    onset = np.arange(0.0, seconds, 2.0)
+    return Score(np.full(len(onset), 40), onset, onset + 1.9, np.full(len(onset), 70))
+
+
+def test_an_instrument_whose_notes_do_not_fade_is_doubtful(tmp_path: Path) -> None:
+    times = np.arange(20 * RATE) / RATE
+    organ = wave(tmp_path / "organ.wav", np.full(len(times), 0.3))
+    (doubt,) = transcribe(Recording.of(organ), Teller(held(20))).remarks
+    assert "is it a piano?" in doubt
+    piano = wave(tmp_path / "piano.wav", 0.3 * np.exp(-(times % 2.0)))
+    assert transcribe(Recording.of(piano), Teller(held(20))).remarks == ()
+
+
+@pytest.mark.parametrize(("notes", "doubted"), [(10, False), (11, True)])
+def test_more_notes_at_once_than_fingers_are_doubtful(
+    tmp_path: Path, notes: int, doubted: bool
+) -> None:
+    onset = np.repeat(np.arange(0.0, 10.0, 0.5), notes)
+    chords = Score(
+        np.tile(np.arange(notes) * 3 + 20, 20), onset, onset + 0.4, np.full(len(onset), 70)
+    )
+    heard = transcribe(Recording.of(tone(tmp_path / "song.wav", 10.0)), Teller(chords))
+    assert any("11 notes begin at once" in doubt for doubt in heard.remarks) == doubted
+
+
+def test_speech_and_noise_are_doubtful(tmp_path: Path) -> None:
+    """Of what is loud nearly all the time, a few notes explain little."""
+    draw = np.random.default_rng(0)
+    few = Score(np.arange(40, 46), np.arange(6) * 1.5, np.arange(6) * 1.5 + 0.2, np.full(6, 50))
+    noise = wave(tmp_path / "noise.wav", draw.uniform(0.1, 0.5, 20 * RATE))
+    assert any(
+        "of the loud time no note is heard" in doubt
+        for doubt in transcribe(Recording.of(noise), Teller(few)).remarks
+    )
+
+
+@pytest.mark.parametrize(("start", "seconds"), [(0.0, 10.0), (3.0, 20.0), (595.0, 10.0)])
+def test_an_excerpt_is_that_of_the_whole(tmp_path: Path, start: float, seconds: float) -> None:
+    recording = Recording.of(ramp(tmp_path / "song.wav", LONG))
+    said = some_notes(LONG)
+    whole = transcribe(recording, Teller(said, ramp=True))
+    listener = Teller(said, ramp=True)
+    part = transcribe_excerpt(recording, start, seconds, listener)
+    wanted, got = excerpt(whole, start, seconds), excerpt(part, start, seconds)
+    for name in ("key", "onset", "offset", "velocity", "pedal"):
+        np.testing.assert_array_equal(getattr(got, name), getattr(wanted, name))
+    # In what is shared by stretches, some is heard twice.
+    assert sum(listener.lengths) < start + seconds + 60
+    assert part.onset.max() < start + seconds + 5
+
+
+def test_an_excerpt_after_a_long_silence_is_found(tmp_path: Path) -> None:
+    loud = np.full(60 * RATE, 0.3)
+    loud[: 40 * RATE] = 0.0
+    recording = Recording.of(wave(tmp_path / "song.wav", loud))
+    onset = np.arange(40.0, 60.0)
+    said = Score(np.full(20, 40), onset, onset + 0.5, np.full(20, 70))
+    part = transcribe_excerpt(recording, 0.0, 5.0, Teller(said))
+    np.testing.assert_array_equal(part.onset, onset)
+
+
+@pytest.mark.parametrize(("start", "seconds"), [(-1.0, 5.0), (np.nan, 5.0), (0.0, 0.0)])
+def test_a_part_of_no_song(tmp_path: Path, start: float, seconds: float) -> None:
+    recording = Recording.of(tone(tmp_path / "song.wav"))
+    with pytest.raises(InputError, match="must be"):
+        transcribe_excerpt(recording, start, seconds, Teller(some_notes(3.0)))
 
 
 def test_notes_that_begin_in_silence_are_none(tmp_path: Path) -> None:

@@ -19,6 +19,10 @@ _STRUCK = 3
 _LOUD = 0.1
 """Share of the loudness of loud parts from which a part is loud, too."""
 _LOUD_PERCENTILE = 95
+_HELD = 10
+"""Parts without an onset, after one, in which it shows whether notes fade: a second."""
+_FEWEST_HELD = 3
+"""Least number of such times to judge by."""
 _RINGS = 1.0
 """[s] for which a note is heard after its key and the pedal are up."""
 
@@ -86,3 +90,24 @@ class Loudness:
             np.add.at(down, np.clip(edge, 0, len(self._parts)).astype(np.int64), step)
         sounding = np.cumsum(down)[:-1] > 0
         return float(1 - sounding[loud].mean())
+
+    def steadiness(self, score: Score) -> float:
+        """How loud held notes are after a second, as a share of their loudness at first.
+
+        The strings of a piano fade; wind, bows and organs go on.
+
+        Args:
+            score: the notes that were heard.
+
+        Returns:
+            The median over notes that sound on for a second in which no other begins; 0 if there
+            are too few of them.
+        """
+        first = np.floor(score.onset * PARTS).astype(np.int64) + 1
+        following = np.append(score.onset[1:], np.inf)
+        held = np.minimum(following, score.offset) - score.onset >= (_HELD + 2) / PARTS
+        held &= first + _HELD < len(self._parts)
+        if held.sum() < _FEWEST_HELD:
+            return 0.0
+        begun, later = self._parts[first[held]], self._parts[first[held] + _HELD]
+        return float(np.median(later / np.maximum(begun, _QUIET)))

@@ -20,6 +20,13 @@ from pianomime.transcription.recording import Recording, Stretch
 
 _FEW, _RARE = 5, 0.2
 """Notes in all, and a second, below which there are hardly any."""
+_FINGERS = 10
+"""Notes that two hands can begin at once."""
+_AT_ONCE = 0.03
+"""[s] In which notes of a chord begin."""
+_STEADY = 0.8
+"""Loudness at the end of a held note, as a share of that at its beginning, from which it does not
+fade as a string does that was struck."""
 _UNEXPLAINED = 0.3
 """Share of the loud time without a note from which something else is heard."""
 _SILENCE = 4.0
@@ -171,4 +178,25 @@ def _doubts(score: Score, loudness: Loudness) -> tuple[str, ...]:
             f"in {share:.0%} of the loud time no note is heard: of voices, other instruments and "
             "noise nothing is written down"
         )
+    steady = loudness.steadiness(score)
+    if steady > _STEADY:
+        doubts.append(
+            f"notes that are held stay as loud as they begin ({steady:.0%} of it): is it a piano?"
+        )
+    crowd, at = _most_at_once(score)
+    if crowd > _FINGERS:
+        doubts.append(
+            f"{crowd} notes begin at once at {at:.1f} s, more than two hands have fingers: is it "
+            "one piano?"
+        )
     return tuple(doubts)
+
+
+def _most_at_once(score: Score) -> tuple[int, float]:
+    """The greatest number of notes that begin at once, and when they do [s]."""
+    if not len(score):
+        return 0, 0.0
+    stop = np.searchsorted(score.onset, score.onset + _AT_ONCE, side="right")
+    count = stop - np.arange(len(score))
+    first = int(np.argmax(count))
+    return int(count[first]), float(score.onset[first])
