@@ -6,6 +6,9 @@ folder of both). F1 is that of the music protocol: onsets within 50 ms on the sa
 
     python benchmarks/transcription.py
     python benchmarks/transcription.py --seconds 10 --cores 1
+    python benchmarks/transcription.py --songs 0 --hand-model hand_landmarker.task
+
+With a hand model, the film is retargeted with the notes of its sound as well, and both are timed.
 """
 
 from __future__ import annotations
@@ -33,6 +36,8 @@ def main() -> None:
         "--seconds", type=float, default=SECONDS, help="of each song (%(default)s)"
     )
     options.add_argument("--cores", type=int, default=CORES, help="cores to use (%(default)s)")
+    options.add_argument("--songs", type=int, default=SONGS, help="besides the film (%(default)s)")
+    options.add_argument("--hand-model", type=Path, help="MediaPipe's hand_landmarker.task")
     given = options.parse_args()
     os.sched_setaffinity(0, common.cores()[: given.cores])
     # A thread that waits for another would count as work.
@@ -44,10 +49,15 @@ def main() -> None:
     common.show_machine(facts)
     bundled = [songs.path(name) for name in songs.names()]
     modern = sorted((common.shared() / "data" / MODERN).glob("*.mid"))
-    rows = [_synthesized(path, given.seconds) for path in (*bundled, *modern)[:SONGS]]
-    rows.append(_film(common.shared() / "data" / FILM, common.shared() / "data" / KNOWN))
+    rows = [_synthesized(path, given.seconds) for path in (*bundled, *modern)[: given.songs]]
+    film = common.shared() / "data" / FILM
+    rows.append(_film(film, common.shared() / "data" / KNOWN))
     common.table(list(rows[0]), [list(row.values()) for row in rows])
-    common.report(given.output, facts, {"cores": given.cores, "rows": rows})
+    speeds = [{"command": "transcribe", "x real time": rows[-1]["x real time"]}]
+    if given.hand_model is not None:
+        speeds.append(_retargeted(film, given.hand_model))
+    common.table(list(speeds[0]), [list(row.values()) for row in speeds])
+    common.report(given.output, facts, {"cores": given.cores, "rows": rows, "speeds": speeds})
 
 
 def _synthesized(path: Path, seconds: float) -> dict[str, Any]:
@@ -66,6 +76,17 @@ def _film(path: Path, known: Path) -> dict[str, Any]:
     from pianomime.music import Score
 
     return {"recording": path.stem, **_heard(path, Score.from_midi(known))}
+
+
+def _retargeted(path: Path, hand_model: Path) -> dict[str, Any]:
+    """How fast a demonstration is made of a film with the notes of its sound; nothing is drawn."""
+    from pianomime.video.retarget import RetargetConfig, retarget
+
+    config = RetargetConfig(hand_model=hand_model, notes="sound")
+    wall = time.perf_counter()
+    made = retarget(path, config, listener=_listener())
+    wall = time.perf_counter() - wall
+    return {"command": "retarget --notes sound", "x real time": made.film.seconds / wall}
 
 
 @cache

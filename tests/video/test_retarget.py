@@ -219,6 +219,12 @@ def test_a_sound_that_is_late(unlit, hands, score):
     )
 
 
+def test_a_sound_that_is_shorter_than_the_film(unlit, hands, score):
+    first = score.clip(0.0, 2.0)
+    made = retarget(unlit, RetargetConfig(hand_model=hands, notes="sound"), listener=Teller(first))
+    assert any("s after the last note that is heard" in remark for remark in made.remarks)
+
+
 def test_heard_notes_that_no_hand_played(unlit, hands, score):
     """A harmonic is left out, another note is kept, and both are told and counted."""
     key, onset = score.key.max(), score.onset[np.argmax(score.key)]

@@ -147,13 +147,18 @@ def on_keyboard(light: LightRecord) -> list[str]:
     ]
 
 
-def on_sound(offset: Offset) -> list[str]:
+def on_sound(score: Score, offset: Offset, seconds: float) -> list[str]:
     """Remarks on how the sound of a video fits its pictures.
 
     Args:
-        offset: where its notes lie in the video.
+        score: all notes that are heard.
+        offset: where they lie in the video.
+        seconds: length of the video [s].
     """
     remarks = on_late_sound(-offset.seconds)
+    silence = seconds - offset.seconds - score.duration
+    if silence > _LONG_END:
+        remarks.append(f"the video goes on for {silence:.1f} s after the last note that is heard")
     if not offset.matches:
         remarks.append(
             f"the sound may not be of what is seen: {offset.touched:.0%} of its notes have a "

@@ -449,7 +449,7 @@ def _place(given: _Given, score: Score, offset: Offset, seconds: float) -> _Time
         "notes_touched_by_chance": round(offset.by_chance, 4),
     }
     if midi is None:
-        remarks = [*score.remarks, *remark.on_sound(offset)]
+        remarks = [*score.remarks, *remark.on_sound(score, offset, seconds)]
     else:
         remarks = remark.on_midi(str(midi), score, offset, seconds)
     return _Timed(on_grid(timed), facts, remarks)

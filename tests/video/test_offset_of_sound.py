@@ -1,0 +1,64 @@
+"""The offset of a sound by the hands alone: where keys do not even seem to move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import made_up_video as made_up
+from pianomime.music import Score
+from pianomime.video.film.light_record import LightRecord
+from pianomime.video.hands.tracks import HandTracks
+from pianomime.video.notes.offset import LATE_SOUND, LATEST_SOUND, Offset, estimate_offset
+from pianomime.video.remarks import on_sound
+
+SECONDS = 16.0
+
+
+@pytest.fixture(scope="module")
+def score() -> Score:
+    """Notes for which both hands move to and fro on the keyboard."""
+    onset = np.arange(0.5, SECONDS - 1.0, 0.25)
+    draw = np.random.default_rng(0)
+    right = 60 + np.round(14 * np.sin(onset)).astype(int) + draw.integers(-3, 4, len(onset))
+    left = 22 + np.round(14 * np.cos(0.7 * onset)).astype(int) + draw.integers(-3, 4, len(onset))
+    key, begin = np.concatenate((right, left)), np.tile(onset, 2)
+    return Score(key, begin, begin + 0.2, np.full(len(key), 80))
+
+
+@pytest.fixture(scope="module")
+def tracks(score: Score) -> HandTracks:
+    points = made_up.plan_of(score).fingertips[..., :2].astype(np.float32)
+    found = np.ones(points.shape[:2], bool)
+    return HandTracks(points, found, np.zeros(points.shape[:3], bool), 0, 0)
+
+
+def offset_of(heard: Score, tracks: HandTracks) -> Offset:
+    with LightRecord.of(np.full((len(tracks), 3, 88, 3), 90, np.uint8)) as dark:
+        return estimate_offset(heard, tracks, dark, None, LATE_SOUND, LATEST_SOUND)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.4, 1.0, 2.5])
+def test_how_late_a_sound_is(score: Score, tracks: HandTracks, late: float) -> None:
+    heard = replace(score, onset=score.onset + late, offset=score.offset + late)
+    offset = offset_of(heard, tracks)
+    assert offset.matches
+    assert offset.seconds == pytest.approx(-late, abs=0.1)
+    said = on_sound(heard, offset, len(tracks) / 20)
+    assert any("later than the pictures" in remark for remark in said) == (late > LATE_SOUND)
+
+
+def test_it_is_never_later_than_it_may_be(score: Score, tracks: HandTracks) -> None:
+    heard = replace(score, onset=score.onset + 6.0, offset=score.offset + 6.0)
+    assert abs(offset_of(heard, tracks).seconds) <= LATEST_SOUND + 0.05
+
+
+@pytest.mark.parametrize("speed", [0.5, 2.0])
+def test_slow_and_fast_motion_are_doubted(score: Score, tracks: HandTracks, speed: float) -> None:
+    heard = replace(score, onset=score.onset * speed, offset=score.offset * speed)
+    offset = offset_of(heard, tracks)
+    assert not offset.matches
+    said = on_sound(heard, offset, len(tracks) / 20)
+    assert any("may not be of what is seen" in remark for remark in said)
