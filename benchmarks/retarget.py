@@ -110,7 +110,7 @@ def _against_reference(folder: Path, model: Path | None) -> dict[str, Any]:
         "homography, worst [mm]": float(off.max()),
         "idle fingertips, median [mm]": 1000 * float(np.median(np.linalg.norm(tips, axis=3)[idle])),
         "fingering equal on key-frames": _equal_fingering(shown, reference),
-        "both hands found before repair": quality["both_hands_found"],
+        "both hands found before repair": float(made.tracks.found.all(axis=1).mean()),
         "offset of the MIDI file [s]": quality["offset_seconds"],
         "seconds of video a second, overlay and page too": quality["seconds"] / seconds,
         "onset F1 (100 ms) without MIDI": onset_f1(

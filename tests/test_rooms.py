@@ -55,9 +55,13 @@ VIDEO = (
     ("keyboard",),
     ("hands",),
     ("notes",),
-    ("align", "parallax", "drawing", "remarks"),
+    ("align", "parallax", "drawing", "keyboard_look"),
+    ("confidence",),
+    ("remarks", "repairs"),
+    ("verdict",),
     ("lit_film", "retarget"),
-    ("overlay", "recording_notes", "summary"),
+    ("overlay", "recording_notes", "moments", "timeline"),
+    ("summary",),
 )
 
 LEARN_ONLY = ("torch", "stable_baselines3", "diffusers", "accelerate", "gymnasium", "ray")

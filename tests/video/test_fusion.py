@@ -75,15 +75,15 @@ def test_light_says_which_keys(played: Score) -> None:
     assert fused.only_seen == len(unheard)
     assert fused.only_heard == len(ghosts)
     (line,) = on_fused(fused)
-    assert line.startswith(f"{len(kept)} of {len(played)} notes are seen and heard; ")
-    assert f"{len(unheard)} only seen are kept, {len(ghosts)} only heard are left out" in line
+    assert line.text.startswith(f"{len(kept)} of {len(played)} notes are seen and heard; ")
+    assert f"{len(unheard)} only seen are kept, {len(ghosts)} only heard are left out" in line.text
 
 
 def test_a_sound_of_something_else(played: Score) -> None:
     other = replace(played, key=played.key + 1)
     fused = fuse(seen_of(played), other)
     assert not fused.alike
-    assert "the sound is of no help" in on_fused(fused)[0]
+    assert "the sound is of no help" in on_fused(fused)[0].text
 
 
 def test_nothing_in_common() -> None:

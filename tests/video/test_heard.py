@@ -56,7 +56,7 @@ def test_a_harmonic_that_no_finger_is_near_is_left_out(
     checked = check_heard(with_notes(played, [key], [onset + 0.01], 60), tracks)
     assert (checked.doubted, checked.left_out) == (0, 1)
     np.testing.assert_array_equal(checked.score.key, played.key)
-    assert "1 notes that are heard are left out" in on_heard(checked)[0]
+    assert "1 notes that are heard are left out" in on_heard(checked)[0].text
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,9 @@ def test_another_one_is_kept_and_counted(
     checked = check_heard(heard, tracks)
     assert (checked.doubted, checked.left_out) == (1, 0)
     assert len(checked.score) == len(heard)
-    assert f"1 of {len(heard)} notes that are heard have no finger near" in on_heard(checked)[0]
+    assert (
+        f"1 of {len(heard)} notes that are heard have no finger near" in on_heard(checked)[0].text
+    )
 
 
 def test_where_a_hand_is_hidden_nothing_is_doubted(played: Score, tracks: HandTracks) -> None:

@@ -175,7 +175,7 @@ def test_offset_from_fingers_and_light(score, points, late):
     by_fingers = offset_of(score, tracks(seen), dark)
     # Fingers are over their keys for a while before and after.
     assert by_fingers.seconds == pytest.approx(late, abs=0.3)
-    assert by_fingers.matches
+    assert by_fingers.touched > by_fingers.by_chance + 0.15
     assert offset_of(score, tracks(seen), light).seconds == pytest.approx(late, abs=0.051)
 
 
@@ -200,7 +200,8 @@ def test_another_song_does_not_match(points):
     onset = np.sort(draw.uniform(0, 7, 60))
     other = Score(draw.integers(10, 70, 60), onset, onset + 0.2, np.full(60, 80))
     dark = np.full((len(points), 3, 88, 3), DARK, np.uint8)
-    assert not offset_of(other, tracks(points), dark).matches
+    found = offset_of(other, tracks(points), dark)
+    assert found.touched < 0.7
 
 
 def test_fingers_are_those_that_were_there(score, plan, points):

@@ -263,5 +263,5 @@ def test_a_picture_in_a_picture(score: Score, tmp_path: Path) -> None:
     if find_keyboards(background(Film(path))):
         assert right(notes_of_recording(path, config), score)
     else:
-        with pytest.raises(InputError, match="no keyboard found; mark where it is"):
+        with pytest.raises(InputError, match="no keyboard found"):
             notes_of_recording(path, config)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from dataclasses import replace
 from fractions import Fraction
 from html import escape
+from itertools import product
 
 import av
 import numpy as np
@@ -26,9 +28,12 @@ from pianomime.video import retarget as room
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands import detector
+from pianomime.video.keyboard.points import place_of
+from pianomime.video.keyboard_look import look_at_keyboard
 from pianomime.video.overlay import write_overlay
 from pianomime.video.remarks import on_keyboard
 from pianomime.video.retarget import RetargetConfig, retarget
+from pianomime.video.summary import write_summary
 
 SIZE = (640, 360)
 LEAD = 0.7
@@ -82,8 +87,10 @@ def test_with_midi(video, midi, hands, score, plan, plane):
     quality = made.demonstration.quality
     assert quality["offset_seconds"] == pytest.approx(LEAD, abs=0.05)
     assert quality["notes_touched"] > 0.9
-    assert quality["both_hands_found"] > 0.9
-    assert quality["left_right_swaps"] > 0
+    assert made.tracks.found.all(axis=1).mean() > 0.9
+    assert quality["repaired"]["hands_swapped_back"] > 0
+    assert made.verdict.grade == "good"
+    assert quality["confidence"] > 0.9
     keys = made.track.usual.to_world(plane.to_pixels([[0.0, -0.5], [0.05, 0.0], [-0.05, 0.5]]))
     np.testing.assert_allclose(keys, [[0.0, -0.5], [0.05, 0.0], [-0.05, 0.5]], atol=0.003)
     # The same fingers as those that were drawn.
@@ -197,8 +204,10 @@ def test_light_and_sound(video, hands, tmp_path, score):
     assert quality["offset_seconds"] == pytest.approx(-0.8, abs=0.05)
     np.testing.assert_allclose(fused.pedal, [[1.0, 2.0]], atol=0.05)
     assert set(np.unique(fused.velocity)) <= set(velocity) | {round(float(np.median(velocity)))}
-    assert any("notes are seen and heard" in remark for remark in made.remarks)
-    assert any("the sound is 0.8" in remark and "later" in remark for remark in made.remarks)
+    assert any("notes are seen and heard" in remark.text for remark in made.remarks)
+    assert any(
+        "the sound is 0.8" in remark.text and "later" in remark.text for remark in made.remarks
+    )
 
 
 @pytest.mark.parametrize("begins", [0.0, 9.0], ids=["of something else", "silent"])
@@ -206,7 +215,7 @@ def test_light_alone_where_the_sound_is_of_no_help(video, hands, tmp_path, score
     film = with_sound(video, tmp_path / "made-up.mp4", delay=0.0, seconds=5.0, begins=begins)
     made = retarget(film, RetargetConfig(hand_model=hands), listener=Teller(score.transpose(23)))
     assert made.demonstration.quality["notes_from"] == "video, from keys that light up"
-    assert sum("the sound is of no help" in remark for remark in made.remarks) == 1
+    assert sum("the sound is of no help" in remark.text for remark in made.remarks) == 1
 
 
 def test_a_sound_that_is_late(unlit, hands, score):
@@ -215,14 +224,15 @@ def test_a_sound_that_is_late(unlit, hands, score):
     # Where keys do not even move, fingers alone tell when, to two frames.
     assert made.demonstration.quality["offset_seconds"] == pytest.approx(-1.0, abs=0.1)
     assert any(
-        "later than the pictures" in remark and "--offset" in remark for remark in made.remarks
+        "later than the pictures" in remark.text and "--offset" in remark.action
+        for remark in made.remarks
     )
 
 
 def test_a_sound_that_is_shorter_than_the_film(unlit, hands, score):
     first = score.clip(0.0, 2.0)
     made = retarget(unlit, RetargetConfig(hand_model=hands, notes="sound"), listener=Teller(first))
-    assert any("s after the last note that is heard" in remark for remark in made.remarks)
+    assert any("s after the last note that is heard" in remark.text for remark in made.remarks)
 
 
 def test_heard_notes_that_no_hand_played(unlit, hands, score):
@@ -238,7 +248,9 @@ def test_heard_notes_that_no_hand_played(unlit, hands, score):
     quality = made.demonstration.quality
     assert (quality["notes_doubted"], quality["notes_left_out"]) == (1, 1)
     assert len(made.demonstration.score) == len(score) + 1
-    assert any(remark.startswith("1 notes that are heard are left out") for remark in made.remarks)
+    assert any(
+        remark.text.startswith("1 notes that are heard are left out") for remark in made.remarks
+    )
 
 
 def test_a_sound_of_something_else_is_of_no_help(unlit, hands, score):
@@ -248,7 +260,8 @@ def test_a_sound_of_something_else_is_of_no_help(unlit, hands, score):
     made = retarget(
         unlit, RetargetConfig(hand_model=hands, notes="sound", offset=0.0), listener=other
     )
-    assert any("the sound may not be of what is seen" in remark for remark in made.remarks)
+    assert made.verdict.grade == "doubtful"
+    assert any("better 23 semitones lower" in remark.text for remark in made.remarks)
     # By default it is not used, and keys that do not light up say nothing.
     with pytest.raises(InputError, match=r"do not light up.*its sound is of no help"):
         retarget(unlit, RetargetConfig(hand_model=hands), listener=other)
@@ -323,14 +336,16 @@ def test_too_long_a_video_that_does_not_say_so(video, hands, monkeypatch):
     monkeypatch.setattr(room, "_MOST_FRAMES", 60)
     made = retarget(video, RetargetConfig(hand_model=hands))
     assert len(made.tracks) == 60
-    assert any("left out" in remark for remark in made.remarks)
+    assert any("left out" in remark.text for remark in made.remarks)
 
 
 def test_a_keyboard_whose_far_end_is_cut_off(video):
     light = np.full((40, 3, 88, 3), 90, np.uint8)
-    light[:, 1] = 0
+    light[:, 1:] = 0
     with LightRecord.of(light) as record:
-        assert on_keyboard(record) == []
+        (remark,) = on_keyboard(look_at_keyboard(record))
+    assert "outside the picture" in remark.text
+    assert remark.weight == "note"
 
 
 def test_another_song_is_noticed(video, hands, tmp_path, score):
@@ -339,7 +354,38 @@ def test_another_song_is_noticed(video, hands, tmp_path, score):
     with pytest.raises(room.InputError, match="not what is played"):
         retarget(video, RetargetConfig(midi=other, hand_model=hands))
     made = retarget(video, RetargetConfig(midi=other, hand_model=hands, offset=0.0))
-    assert any("may not be" in remark for remark in made.remarks)
+    assert made.verdict.grade == "doubtful"
+    assert "better 23 semitones lower" in made.verdict.line
+    assert made.demonstration.quality["confidence"] < 0.2
+    write_summary(made, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text("utf-8")
+    assert escape(made.verdict.line) in page
+    assert "no finger on the keys of notes about it (red)" in page
+    assert "A good moment" not in page
+
+
+@pytest.mark.parametrize(("octaves", "keys"), [(0, 0), (1, 0), (0, 1)])
+def test_keys_that_are_marked_wrongly(video, hands, tmp_path, plane, octaves, keys):
+    """The hands, and the notes of keys that light up, are off together: only the picture tells."""
+    whites = "CDEFGAB"
+    points = {}
+    for octave, white in product((2, 4, 5), (0, 3)):
+        name = f"{whites[white]}{octave} front left", f"{whites[white]}{octave} back left"
+        called = f"{whites[white + keys]}{octave + octaves}"
+        for corner in name:
+            where = plane.to_pixels(place_of(corner)).tolist()
+            points[f"{called}{corner.removeprefix(corner[:2])}"] = where
+    marked = tmp_path / "points.json"
+    marked.write_text(json.dumps({"points": points}))
+    made = retarget(video, RetargetConfig(hand_model=hands, points=marked))
+    grade = made.verdict.grade
+    contradicted = any("contradicts the names" in remark.text for remark in made.remarks)
+    if keys:
+        assert grade == "doubtful"
+        assert made.confidence.frames.max() < 0.1
+    else:
+        assert grade == ("usable" if octaves else "good")
+    assert contradicted == bool(octaves or keys)
 
 
 def test_a_longer_song_is_cut(video, hands, tmp_path, score, plan, plane):
@@ -348,7 +394,7 @@ def test_a_longer_song_is_cut(video, hands, tmp_path, score, plan, plane):
     short = tmp_path / "short.mp4"
     made_up.write(short, plane, SIZE, score, plan, made_up.times(3.0, 20))
     made = retarget(short, RetargetConfig(midi=long, hand_model=hands))
-    assert any("after the video ends" in remark for remark in made.remarks)
+    assert any("after the video ends" in remark.text for remark in made.remarks)
     assert made.demonstration.score.duration <= 3.0
 
 
@@ -360,8 +406,9 @@ def test_one_hand_is_enough(video, midi, hands, plane, plan, monkeypatch):
     seen = OneHand(plane, SIZE, plan.fingertips[..., :2])
     monkeypatch.setattr(room, "HandDetector", lambda _: seen)
     made = retarget(video, RetargetConfig(midi=midi, hand_model=hands))
-    assert "only one hand is seen: the left one is made up, at rest" in made.remarks
-    assert made.demonstration.quality["right_hand_found"] > 0.9
+    said = [remark.text for remark in made.remarks]
+    assert "only one hand is seen: the left one is made up, at rest" in said
+    assert made.tracks.found[:, 1].mean() > 0.9
     # What the right hand plays is not given to the other one.
     assert (made.fingers.hand[made.demonstration.score.key > 36] == 1).all()
 
@@ -459,7 +506,7 @@ def test_a_cut_is_noticed(hands, tmp_path, score, plan, plane, midi):
             film.mux(stream.encode(new))
         film.mux(stream.encode(None))
     made = retarget(end, RetargetConfig(midi=midi, hand_model=hands))
-    assert any("no keyboard is seen from 3.5 s to" in remark for remark in made.remarks)
+    assert any("no keyboard is seen from 3.5 s to" in each.text for each in made.remarks)
 
 
 @pytest.mark.parametrize("light_up", [True, False])
@@ -481,7 +528,7 @@ def test_a_camera_that_moves(light_up, hands, monkeypatch, tmp_path, score, plan
     )
     given = RetargetConfig(midi=None if light_up else midi, hand_model=hands)
     made = retarget(path, given)
-    assert any("no keyboard is seen from 1.0 s to 1.6 s" in told for told in made.remarks), (
+    assert any("no keyboard is seen from 1.0 s to 1.6 s" in told.text for told in made.remarks), (
         made.remarks
     )
     heard = score.clip(0.0, 5.0)
@@ -514,7 +561,8 @@ def test_the_command_writes_all_or_nothing(video, midi, hands, tmp_path, capsys)
     assert (overlay.width, overlay.height) == SIZE
     with av.open(str(overlay.path)) as film:
         assert not film.streams.audio  # nor has the video
-    assert "Where tracking was poor" in (tmp_path / "new" / "demo-seen.html").read_text("utf-8")
+    page = (tmp_path / "new" / "demo-seen.html").read_text("utf-8")
+    assert "Good: use it as it is." in page
     cli.main(["play", str(out), "--seconds", "1", "-o", str(tmp_path / "played")])
     assert (tmp_path / "played" / "report.json").exists()
 
@@ -543,6 +591,9 @@ def test_no_keyboard_and_no_hands(hands, tmp_path, monkeypatch, video, midi, cap
         printed = capsys.readouterr().err.strip()
         assert why in printed
         assert "\n" not in printed
+        if path == blank:  # what to try
+            assert f"pianomime keyboard {blank}" in printed
+            assert f"pianomime pick {blank}" in printed
     assert not out.parent.exists()
 
 
@@ -555,7 +606,8 @@ def test_the_real_one(shared):
     )
     made = retarget(folder / "Stan_1.mp4", config)
     quality = made.demonstration.quality
-    assert quality["both_hands_found"] >= 0.99
+    assert made.tracks.found.all(axis=1).mean() >= 0.99
+    assert made.verdict.grade == "good"
     assert quality["offset_seconds"] == pytest.approx(-3.23, abs=0.06)
     rows = len(reference["finger_key"])
     idle = reference["finger_key"] < 0

@@ -75,7 +75,7 @@ class FindKeyboard:
         if not keyboards:
             print("no keyboard found" if self.octave is None else "no such keyboard found")
         else:
-            doubts = "; in doubt: ".join(["", *on_naming(keyboards)])
+            doubts = "; in doubt: ".join(["", *map(str, on_naming(keyboards))])
             print(f"{keyboards[0].describe()}{doubts}")
         if self.out is not None:
             self.out.parent.mkdir(parents=True, exist_ok=True)

@@ -62,7 +62,7 @@ class Retarget:
     """Write DEMO-seen.mp4."""
 
     def run(self) -> None:
-        """Make the demonstration, and print how good it is.
+        """Make the demonstration, and print how good it is and what to do.
 
         Raises:
             InputError: no demonstration can be made from these files.
@@ -111,12 +111,18 @@ class Retarget:
             write_summary(made, folder / page.name)
             made.demonstration.save(folder / out.name)
         quality = made.demonstration.quality
+        print(shown(made.verdict.line))
         print(f"keyboard: {quality['keyboard']}")
-        print(f"both hands seen in {quality['both_hands_found']:.1%} of the frames")
-        print(f"notes: {quality['notes']}, fingers guessed: {quality['notes_guessed']}")
-        print(f"notes are from: {shown(quality['notes_from'])}")
+        print(
+            f"notes: {quality['notes']}, from {shown(quality['notes_from'])}; "
+            f"{quality['notes_touched']:.0%} have a finger on their key (shifted to other keys or "
+            f"times, {quality['notes_touched_by_chance']:.0%} would)"
+        )
+        print(f"in doubt: {quality['seconds_in_doubt']:.1f} s of {quality['seconds']:.1f} s")
         for remark in made.remarks[:_REMARKS]:
-            print(f"note: {shown(remark)}")
+            print(f"note: {shown(remark.text)}")
+            if remark.action:
+                print(f"   do: {shown(remark.action)}")
         if len(made.remarks) > _REMARKS:
             print(f"note: {len(made.remarks) - _REMARKS} more such notes are on the page")
         print(f"page: {shown(page)}")

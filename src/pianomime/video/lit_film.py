@@ -52,7 +52,10 @@ def notes_of_lit_film(
     if film.seconds > MAX_SECONDS:
         raise InputError(f"{film.path}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
     if points is None:
-        view = find_views(film, most, octave, mirrored, progress)[0]
+        views = find_views(film, most, octave, mirrored, progress)
+        if not views:
+            raise InputError(remark.no_keyboard(film.path, remark.told_names(octave, mirrored)))
+        view = views[0]
     else:
         view = view_of_points(points, film)
     reader = KeyLight(view.track, film.working_size)
@@ -74,4 +77,4 @@ def notes_of_lit_film(
         *remark.on_stretches(view),
         *remark.on_unseen_keyboard(view.track.missing(frames)),
     ]
-    return replace(read.score, remarks=tuple(told))
+    return replace(read.score, remarks=tuple(map(str, told)))

@@ -121,14 +121,14 @@ def _reason(path: Path, error: InputError) -> str:
 
 def _alone(seen: Score, why: str) -> RecordingNotes:
     """The notes of keys that light up, where the sound says nothing of them."""
-    remarks = (*seen.remarks, *remark.on_unused_sound(why))
+    remarks = (*seen.remarks, *map(str, remark.on_unused_sound(why)))
     return RecordingNotes(replace(seen, remarks=remarks), "light")
 
 
 def _both(seen: Score, heard: Score) -> RecordingNotes:
     """The notes of light and sound where they agree; else those that are less in doubt."""
     fused = fuse(seen, heard)
-    said = tuple(remark.on_fused(fused))
+    said = tuple(map(str, remark.on_fused(fused)))
     if fused.alike:
         score = replace(fused.score, remarks=(*seen.remarks, *said))
         return RecordingNotes(score, "light and sound")

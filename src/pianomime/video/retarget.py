@@ -9,12 +9,13 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
 from pianomime.errors import InputError
 from pianomime.installation import install_command
 from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
 from pianomime.music.score import MAX_SECONDS
-from pianomime.plan import LEFT, RIGHT
 from pianomime.plan.demonstration import Demonstration, on_grid
 from pianomime.progress import Progress, no_progress
 from pianomime.shown import shown, title_of
@@ -23,15 +24,19 @@ from pianomime.transcription.recording import Recording
 from pianomime.transcription.transcribe import transcribe
 from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
+from pianomime.video.confidence import DOUBT, Confidence, estimate_confidence
+from pianomime.video.film.background import background, median_of
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.detector import HandDetector, check_mediapipe
 from pianomime.video.hands.model import find_hand_model
 from pianomime.video.hands.sightings import Sightings
 from pianomime.video.hands.tracks import HandTracks, follow
+from pianomime.video.keyboard.keyboard import find_keyboards
 from pianomime.video.keyboard.points import NamedPoints, read_points
 from pianomime.video.keyboard.track import KeyboardTrack
 from pianomime.video.keyboard.views import View, find_views, view_of_points
+from pianomime.video.keyboard_look import KeyboardLook, look_at_keyboard
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
 from pianomime.video.notes.fusion import fuse
 from pianomime.video.notes.heard import check_heard
@@ -39,13 +44,14 @@ from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.offset import LATE_SOUND, LATEST_SOUND, Offset, estimate_offset
 from pianomime.video.notes.reading import ReadNotes, read_notes
 from pianomime.video.parallax import correct_parallax
+from pianomime.video.remarks import Remark
+from pianomime.video.repairs import Repair, list_repairs
+from pianomime.video.verdict import Verdict, judge
 
 _MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
 """Frames of the longest score; a video may be longer than its header says."""
 _TOO_FEW_TOUCHED = 0.5
 """Share of a MIDI file's notes with a finger on their key below which it is of another song."""
-_FEW_TOUCHED = 0.7
-"""Share of notes with a finger on their key below which notes read from a video are doubtful."""
 _BETTER = 0.02
 """Share of notes by which a less likely octave must have more fingers on keys to be chosen."""
 
@@ -89,7 +95,10 @@ class Retargeted:
         track: of the keyboard in its pictures.
         tracks: the tracked hands.
         fingers: the finger that plays each note.
-        remarks: what a user should know, one line each.
+        confidence: in each frame.
+        repairs: what was repaired, and how often.
+        remarks: what a user should know, and do.
+        verdict: whether to use it.
     """
 
     demonstration: Demonstration
@@ -97,7 +106,10 @@ class Retargeted:
     track: KeyboardTrack
     tracks: HandTracks
     fingers: NoteFingers
-    remarks: list[str]
+    confidence: Confidence
+    repairs: list[Repair]
+    remarks: list[Remark]
+    verdict: Verdict
 
 
 def retarget(
@@ -130,26 +142,56 @@ def retarget(
     fingers = find_note_fingers(timed.score, fingertips, seen.tracks.seen)
     parallax = correct_parallax(fingertips, timed.score, fingers)
     fingers = find_note_fingers(timed.score, fingertips, seen.tracks.seen)
+    confidence = estimate_confidence(
+        seen.tracks,
+        timed.score,
+        fingers,
+        fingertips[: len(seen.tracks), ..., :2].astype(np.float32),
+        seen.look,
+        timed.certainty,
+    )
     plan = align(timed.score, fingertips, fingers, config.align)
+    agreed, facts = confidence.agreement, timed.facts
     remarks = [
+        *remark.on_agreement(confidence, facts["notes_from"], facts.get("offset_seconds")),
         *seen.remarks,
         *timed.remarks,
-        *remark.on_fingering(fingers, plan),
+        *remark.on_fingering(confidence, plan),
         *remark.on_lost_hands(seen.tracks),
     ]
+    verdict = judge(confidence, remarks)
+    repairs = list_repairs(seen.tracks, plan, confidence, timed.outside)
+    frames = confidence.frames
     quality: dict[str, Any] = {
+        "verdict": verdict.grade,
+        "confidence": round(float(frames.mean()), 4),
+        "seconds": len(frames) / FRAME_RATE,
+        "seconds_in_doubt": int((frames < DOUBT).sum()) / FRAME_RATE,
         "keyboard": seen.view.description,
-        **_quality_of_hands(seen.tracks),
+        "black_and_white_agree": None if seen.look.pattern is None else round(seen.look.pattern, 4),
         "notes": len(timed.score),
-        "notes_guessed": int(fingers.guessed.sum()),
+        **facts,
+        "notes_touched": round(agreed.share, 4),
+        "notes_touched_by_chance": round(agreed.chance, 4),
         "parallax_millimetres": round(parallax, 2),
         "align": config.align,
-        **timed.facts,
-        "remarks": remarks,
+        "repaired": {repair.name: repair.count for repair in repairs},
+        "remarks": [str(each) for each in remarks],
+        "confidence_by_second": [round(float(each), 2) for each in confidence.by_second()],
     }
     homography = seen.view.track.usual.zoomed(given.film.zoom).matrix
     demonstration = Demonstration(timed.score, plan, shown(video.name), homography, quality)
-    return Retargeted(demonstration, given.film, seen.view.track, seen.tracks, fingers, remarks)
+    return Retargeted(
+        demonstration,
+        given.film,
+        seen.view.track,
+        seen.tracks,
+        fingers,
+        confidence,
+        repairs,
+        remarks,
+        verdict,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,11 +270,21 @@ def _recording(video: Path, config: RetargetConfig) -> Recording | None:
 
 @dataclass(frozen=True, eq=False)
 class _Timed:
-    """The score in the time of the video, facts for `Demonstration.quality`, and remarks."""
+    """The score in the time of the video.
+
+    Attributes:
+        score: the notes.
+        facts: for `Demonstration.quality`.
+        remarks: on the notes.
+        certainty: how sure the notes are for another reason than the fingers, 0..1.
+        outside: number of notes before or after the video, which are left out.
+    """
 
     score: Score
     facts: dict[str, Any]
-    remarks: list[str]
+    remarks: list[Remark]
+    certainty: float = 1.0
+    outside: int = 0
 
 
 class _Taken(NamedTuple):
@@ -242,13 +294,13 @@ class _Taken(NamedTuple):
         view: number of the view.
         tracks: the tracked hands.
         timed: the notes.
-        guessed: what they do not decide of the keyboard, one line each.
+        guessed: what they do not decide of the keyboard.
     """
 
     view: int
     tracks: HandTracks
     timed: _Timed
-    guessed: tuple[str, ...] = ()
+    guessed: tuple[Remark, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +310,8 @@ class _Seen:
     view: View
     tracks: HandTracks
     timed: _Timed
-    remarks: list[str]
+    look: KeyboardLook
+    remarks: list[Remark]
 
 
 def _find_views(given: _Given, progress: Progress) -> list[View]:
@@ -267,8 +320,24 @@ def _find_views(given: _Given, progress: Progress) -> list[View]:
         return [view_of_points(given.points, given.film)]
     config = given.config
     views = find_views(given.film, _MOST_FRAMES, config.octave, config.mirrored, progress)
+    if not views:
+        raise InputError(remark.no_keyboard(given.film.path, _told(config)))
     # Only notes can decide what is open; without them the likeliest is assumed.
     return views if given.score is not None or given.may_listen else views[:1]
+
+
+def _told(config: RetargetConfig) -> list[str]:
+    return remark.told_names(config.octave, config.mirrored)
+
+
+def _on_told_names(given: _Given, track: KeyboardTrack) -> list[Remark]:
+    """Remarks on names of the keys that a user told, where the picture contradicts them."""
+    if given.points is None and not _told(given.config):
+        return []
+    if track.backgrounds:
+        picture, plane = track.backgrounds[0]
+        return remark.on_told_names(plane, find_keyboards(median_of([picture])))
+    return remark.on_told_names(track.usual, find_keyboards(background(given.film)))
 
 
 def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
@@ -283,16 +352,21 @@ def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
             taken = _from_score(given, given.score, views, sightings, lights)
         del sightings  # in hours of video, they take much memory
         view, light, tracks = views[taken.view], lights[taken.view], taken.tracks
+        missing = view.track.missing(len(tracks))
+        look = look_at_keyboard(light)
         remarks = [
             *taken.guessed,
+            *_on_told_names(given, view.track),
             *remark.on_stretches(view),
-            *remark.on_unseen_keyboard(view.track.missing(len(tracks))),
+            *remark.on_unseen_keyboard(missing),
             *remark.on_missing_hands(tracks),
-            *remark.on_keyboard(light),
+            *remark.on_keyboard(look),
         ]
         if len(tracks) == _MOST_FRAMES:
-            remarks.append(f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out")
-    return _Seen(view, tracks, taken.timed, remarks)
+            text = f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out"
+            remarks.append(Remark(text, "cut the video, and retarget its parts"))
+        look = replace(look, usual=np.where(missing, np.float32(0.0), look.usual))
+    return _Seen(view, tracks, taken.timed, look, remarks)
 
 
 def _detect(
@@ -339,8 +413,11 @@ def _checked(timed: _Timed, tracks: HandTracks) -> _Timed:
     """Notes of the sound without those that no hand can have played."""
     checked = check_heard(timed.score, tracks)
     facts = {"notes_doubted": checked.doubted, "notes_left_out": checked.left_out}
-    return _Timed(
-        checked.score, {**timed.facts, **facts}, [*timed.remarks, *remark.on_heard(checked)]
+    return replace(
+        timed,
+        score=checked.score,
+        facts={**timed.facts, **facts},
+        remarks=[*timed.remarks, *remark.on_heard(checked)],
     )
 
 
@@ -382,18 +459,11 @@ def _check_hands(given: _Given, tracks: HandTracks) -> None:
 
 def _read_score(read: ReadNotes) -> _Timed:
     """The score read from keys that light up."""
-    remarks = []
-    if read.touched < _FEW_TOUCHED:
-        remarks.append(
-            f"the notes are read from the video and doubtful: {read.touched:.0%} have a finger on "
-            "their key"
-        )
     facts = {
         "notes_from": "video, from keys that light up",
         "keys_lit_confidence": round(read.confidence, 4),
-        "notes_touched": round(read.touched, 4),
     }
-    return _Timed(on_grid(read.score), facts, remarks)
+    return _Timed(on_grid(read.score), facts, [], read.confidence)
 
 
 def _fused(given: _Given, timed: _Timed, progress: Progress) -> _Timed:
@@ -402,12 +472,12 @@ def _fused(given: _Given, timed: _Timed, progress: Progress) -> _Timed:
         heard = given.heard(progress)
     except InputError as error:
         said = remark.on_unused_sound(f"{error}".removeprefix(f"{given.film.path}: "))
-        return _Timed(timed.score, timed.facts, [*timed.remarks, *said])
+        return replace(timed, remarks=[*timed.remarks, *said])
     early = given.config.offset
     fused = fuse(timed.score, heard, None if early is None else -early)
     remarks = [*timed.remarks, *remark.on_fused(fused)]
     if not fused.alike:
-        return _Timed(timed.score, timed.facts, remarks)
+        return replace(timed, remarks=remarks)
     facts = {
         **timed.facts,
         "notes_from": "video, from keys that light up, and its sound",
@@ -416,7 +486,7 @@ def _fused(given: _Given, timed: _Timed, progress: Progress) -> _Timed:
         "notes_only_seen": fused.only_seen,
         "notes_only_heard": fused.only_heard,
     }
-    return _Timed(on_grid(fused.score), facts, remarks)
+    return replace(timed, score=on_grid(fused.score), facts=facts, remarks=remarks)
 
 
 def _place(given: _Given, score: Score, offset: Offset, seconds: float) -> _Timed:
@@ -429,8 +499,9 @@ def _place(given: _Given, score: Score, offset: Offset, seconds: float) -> _Time
             else f"{midi} is not what is played in {film}"
         )
         raise InputError(
-            f"{other}: at best {offset.touched:.0%} of its notes have a finger on their key (give "
-            "--offset to go on anyway)"
+            f"{other}: at best {offset.touched:.0%} of its notes have a finger on their key, "
+            f"{offset.by_chance:.0%} would by chance (it is another piece, or the keys are named "
+            "wrongly: see `pianomime keyboard`; give --offset to go on anyway)"
         )
     begin, end = -offset.seconds, seconds - offset.seconds
     if end <= score.onset[0] or begin >= score.duration:
@@ -443,26 +514,14 @@ def _place(given: _Given, score: Score, offset: Offset, seconds: float) -> _Time
             cut, onset=cut.onset - begin, offset=cut.offset - begin, pedal=cut.pedal - begin
         )
     facts = {
-        "notes_from": "sound" if midi is None else shown(midi.name),
+        "notes_from": remark.SOUND if midi is None else shown(midi.name),
         "offset_seconds": round(offset.seconds, 4),
-        "notes_touched": round(offset.touched, 4),
-        "notes_touched_by_chance": round(offset.by_chance, 4),
     }
     if midi is None:
-        remarks = [*score.remarks, *remark.on_sound(score, offset, seconds)]
+        remarks = [
+            *(Remark(text) for text in score.remarks),
+            *remark.on_sound(score, offset, seconds),
+        ]
     else:
-        remarks = remark.on_midi(str(midi), score, offset, seconds)
-    return _Timed(on_grid(timed), facts, remarks)
-
-
-def _quality_of_hands(tracks: HandTracks) -> dict[str, Any]:
-    """How well the hands were seen, for `Demonstration.quality`."""
-    return {
-        "seconds": len(tracks) / FRAME_RATE,
-        "both_hands_found": round(float(tracks.found.all(axis=1).mean()), 4),
-        "left_hand_found": round(float(tracks.found[:, LEFT].mean()), 4),
-        "right_hand_found": round(float(tracks.found[:, RIGHT].mean()), 4),
-        "points_mended": round(float(tracks.mended.mean()), 4),
-        "ghost_hands": tracks.ghosts,
-        "left_right_swaps": tracks.swaps,
-    }
+        remarks = remark.on_midi(score, offset, seconds)
+    return _Timed(on_grid(timed), facts, remarks, outside=len(score) - len(timed))

@@ -1,50 +1,93 @@
-"""Page that shows how well hands, keys and notes were seen in a video."""
+"""Page that shows how far a demonstration made from a video can be trusted, and what to do."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from string import Template
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from pianomime import __version__
 from pianomime.files import atomic
-from pianomime.keyboard import FRAME_RATE
-from pianomime.palette import DARK, LIGHT, Theme
-from pianomime.plan import LEFT, RIGHT
-from pianomime.video.drawing import Drawing
+from pianomime.keyboard import FRAME_RATE, NO_KEY
+from pianomime.palette import DARK, LIGHT, rgb
+from pianomime.video.drawing import Drawing, key_outline
+from pianomime.video.keyboard.plane import Plane
+from pianomime.video.moments import Moment, good_moment, worst_moments
+from pianomime.video.remarks import Remark
+from pianomime.video.repairs import Repair
 from pianomime.video.retarget import Retargeted
+from pianomime.video.timeline import draw_timeline
 from pianomime.web_page import data_url, web_page
+from pianomime.world.layout import FINGER_COUNT
+from pianomime.world.parameters import key_centres
 
-_PICTURES = 3
-_MOST_POINTS = 20_000
-"""Most points of a plotted line; the picture has some thousand columns."""
+_SHOWN_X = (-0.13, 0.24)
+"""World x of the part of a picture that is shown: what is above the keys, to the wrists [m]."""
+_JPEG_QUALITY = 85
+_MARK = rgb(DARK.wrong)
+"""Colour of the frames about keys that no finger is on; bright, as pictures are mostly dark."""
+_ORDER = ("wrong", "check", "note")
+"""Weights of remarks, the most important first."""
+_LISTED = 5
+"""Most remarks of one kind that are listed; hours of video can have hundreds."""
 
 _STYLE = """\
-img + img { margin-top: 1rem; }
-td:nth-child(2) { text-align: left; }
-li { margin: .2rem 0; }
+table.many td:nth-child(2), table.facts td:nth-child(2) { text-align: left; }
+table.many td:nth-child(n+2) { text-align: right; white-space: nowrap; padding-left: 1rem; }
+table.facts td:first-child { white-space: nowrap; }
+tr.none td { color: var(--faint); }
+ol, ul { margin: 0; padding-left: 1.25rem; }
+li { margin: .45rem 0; }
+li strong, figcaption strong { font-weight: 600; }
+.do { display: block; color: var(--faint); }
+.do::before { content: "\\2192\\00a0"; }
+figure { margin: 0 0 1.1rem; }
+figcaption { margin-top: .35rem; }
+.verdict { font-size: 1.2rem; font-weight: 600; border-left: 5px solid var(--right); }
+.verdict.good { border-left-color: #1f9d55; }
+.verdict.doubtful { border-left-color: var(--wrong); }
+.verdict p { margin: 0; }
+.verdict small { display: block; margin-top: .35rem; font-weight: 400; font-size: .9rem; }
 """
 _BODY = Template("""\
 <h1>$title</h1>
-<p class="under">How well hands, keys and notes were seen</p>
-<section><h2>Remarks</h2>$remarks</section>
-<section><h2>Where tracking was poor</h2>
+<p class="under">How far this demonstration can be trusted, and what to do</p>
+<section class="verdict $grade"><p>$verdict</p><small>$measured</small></section>
+<section><h2>What to do</h2>$remarks</section>
+<section><h2>$worst_title</h2>$worst</section>
+$good
+<section><h2>Confidence over time</h2>
 <picture>
 <source media="(prefers-color-scheme: dark)" srcset="$dark_timeline">
-<img alt="Position of both hands and misfit of every note over time" src="$timeline">
+<img alt="Confidence, what lowers it, both hands and the misfit of every note over time"
+ src="$timeline">
 </picture>
-<p>Dots on the lines: the hand was not seen, and its position is interpolated. Below: the distance
-of each note's finger from its key at the onset; above the line it is too far.</p></section>
-<section><h2>Frames of the video</h2>$pictures</section>
-<section><h2>Quality</h2><table>$quality</table></section>
+<p>Confidence is the product of three parts: how well the hands are seen, whether the keys are where
+they should be, and how much better than by chance notes have a finger on their key. Below the line
+it is in doubt. Then what lowers it; where the hands are (dots: not seen, and interpolated); and the
+distance of each note's finger from its key (crosses: no finger was on the key).</p></section>
+<section><h2>What was repaired</h2><table class="many">$repairs</table></section>
+<section><h2>Technical facts</h2><table class="facts">$facts</table></section>
 <footer>Made by PianoMime $version.</footer>
 """)
+_FACTS = {
+    "keyboard": "keyboard",
+    "black_and_white_agree": "black and white keys where they should be (1: all of them; shifted "
+    "by keys: 0.65 at most)",
+    "notes_from": "notes are from",
+    "keys_lit_confidence": "how sure it is that keys light up",
+    "offset_seconds": "the notes begin after the video begins [s]",
+    "parallax_millimetres": "parallax corrected, median [mm]",
+    "align": "--align",
+    "seconds": "seconds of video",
+}
+"""What is shown of `Demonstration.quality` at the end, and what it is called."""
 
 
 def write_summary(made: Retargeted, path: Path) -> None:
@@ -54,83 +97,137 @@ def write_summary(made: Retargeted, path: Path) -> None:
         made: the retargeted video.
         path: self-contained HTML file; it appears only when complete.
     """
-    remarks = "".join(f"<li>{escape(remark)}</li>" for remark in made.remarks)
     title = f"Retargeting {made.demonstration.source}"
+    quality = made.demonstration.quality
+    drawn = _Pictures(made)
+    worst, good = worst_moments(made), good_moment(made)
     body = _BODY.substitute(
         title=escape(title),
-        remarks=f"<ul>{remarks}</ul>" if remarks else "<p>None.</p>",
-        timeline=data_url("image/png", _timeline(made, LIGHT)),
-        dark_timeline=data_url("image/png", _timeline(made, DARK)),
+        grade=made.verdict.grade,
+        verdict=escape(made.verdict.line),
+        measured=escape(_measured(made)),
+        remarks=_remarks(made.remarks),
+        worst_title="The worst moments" if len(worst) > 1 else "The worst moment",
+        worst="".join(map(drawn.figure, worst)),
+        good=""
+        if good is None
+        else f"<section><h2>A good moment, to compare</h2>{drawn.figure(good)}</section>",
+        timeline=data_url("image/png", draw_timeline(made, LIGHT)),
+        dark_timeline=data_url("image/png", draw_timeline(made, DARK)),
+        repairs="".join(map(_repair, made.repairs)),
+        facts="".join(
+            f"<tr><td>{escape(name)}</td><td>{escape(str(quality[key]))}</td></tr>"
+            for key, name in _FACTS.items()
+            if quality.get(key) is not None
+        ),
         version=escape(__version__),
-        pictures="".join(
-            f'<img alt="keys and hands" src="{data_url("image/png", _png(picture))}">'
-            for picture in _pictures(made)
-        ),
-        quality="".join(
-            f"<tr><td>{escape(name.replace('_', ' '))}</td><td>{escape(str(value))}</td></tr>"
-            for name, value in made.demonstration.quality.items()
-            if name != "remarks"
-        ),
     )
     with atomic(path) as temporary:
         temporary.write_text(web_page(f"{title} - PianoMime", body, _STYLE), encoding="utf-8")
 
 
-def _timeline(made: Retargeted, theme: Theme) -> bytes:
-    """PNG of both hands and of the misfit of every note over time."""
-    tracks, score, fingers = made.tracks, made.demonstration.score, made.fingers
-    figure = Figure(figsize=(12, 4.5), layout="constrained", facecolor=theme.paper)
-    hands, notes = figure.subplots(2, 1, sharex=True)
-    seconds = np.arange(len(tracks)) / FRAME_RATE
-    some = slice(None, None, max(1, len(tracks) // _MOST_POINTS))
-    for hand, name in ((LEFT, "left hand"), (RIGHT, "right hand")):
-        colour = theme.hands[hand]
-        middle = tracks.points[:, hand, 1:, 1].mean(axis=1)
-        hands.plot(seconds[some], middle[some], color=colour, label=name)
-        lost = ~tracks.found[:, hand]
-        label = None if hand == LEFT else "not seen"
-        hands.scatter(seconds[lost], middle[lost], color=theme.wrong, s=8, zorder=3, label=label)
-        mine = fingers.hand == hand
-        notes.scatter(score.onset[mine], np.sqrt(fingers.misfit[mine]), color=colour, s=10)
-    hands.set_ylabel("hand along keyboard [m]")
-    hands.legend(
-        loc="lower right", bbox_to_anchor=(1, 1), ncols=3, frameon=False, labelcolor=theme.text
+def _measured(made: Retargeted) -> str:
+    """What the verdict rests on, in one line."""
+    agreed = made.confidence.agreement
+    quality = made.demonstration.quality
+    return (
+        f"{agreed.share:.0%} of {quality['notes']} notes have a finger on their key when they "
+        f"begin; shifted to other keys or times, {agreed.chance:.0%} of them would. "
+        f"{quality['seconds_in_doubt']:.1f} s of {quality['seconds']:.1f} s are in doubt."
     )
-    notes.axhline(3.0, color=theme.wrong, linewidth=0.8)
-    notes.set_ylabel("finger off key [1/3 key]")
-    notes.set_xlabel("time [s]")
-    for axes in (hands, notes):
-        axes.set_facecolor(theme.paper)
-        axes.grid(color=theme.lines, linewidth=0.6)
-        axes.tick_params(colors=theme.faint_text, length=0)
-        axes.xaxis.label.set_color(theme.faint_text)
-        axes.yaxis.label.set_color(theme.faint_text)
-        for spine in axes.spines.values():
-            spine.set_visible(False)
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=110)
-    return picture.getvalue()
 
 
-def _pictures(made: Retargeted) -> list[NDArray[np.uint8]]:
-    """From each third of the video the frame with the most pressed keys, drawn over."""
-    finger_key = made.demonstration.plan.finger_key
-    count = min(len(finger_key), len(made.tracks))
-    busy = (finger_key[:count] >= 0).sum(axis=(1, 2))
-    drawing = Drawing(made.track)
-    drawn = []
-    for part in np.array_split(np.arange(count), _PICTURES):
-        if not len(part):
-            continue
-        number = int(part[busy[part].argmax()])
+def _remarks(remarks: Sequence[Remark]) -> str:
+    """A list of what is wrong and what to do, the most important first, one item an action."""
+    if not remarks:
+        return "<p>Nothing.</p>"
+    by_action: dict[str, list[Remark]] = {}
+    for remark in sorted(remarks, key=lambda each: _ORDER.index(each.weight)):
+        by_action.setdefault(remark.action, []).append(remark)
+    items = []
+    for action, same in by_action.items():
+        texts = [_text(remark) for remark in same[:_LISTED]]
+        if len(same) > _LISTED:
+            texts.append(f"{len(same) - _LISTED} more such remarks")
+        do = f'<span class="do">{escape(action)}</span>' if action else ""
+        items.append(f"<li>{'<br>'.join(texts)}{do}</li>")
+    return f"<ul>{''.join(items)}</ul>"
+
+
+def _text(remark: Remark) -> str:
+    return (
+        f"<strong>{escape(remark.text)}</strong>"
+        if remark.weight != "note"
+        else escape(remark.text)
+    )
+
+
+def _repair(repair: Repair) -> str:
+    share = "" if repair.total is None else f"of {repair.total}"
+    percent = "" if not repair.total else f"{repair.count / repair.total:.1%}"
+    none = "" if repair.count else ' class="none"'
+    cells = (repair.text, str(repair.count), share, percent)
+    return f"<tr{none}>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
+
+
+class _Pictures:
+    """Frames of the video with keys and hands drawn into them."""
+
+    def __init__(self, made: Retargeted) -> None:
+        self._made = made
+        self._drawing = Drawing(made.track)
+
+    def figure(self, moment: Moment) -> str:
+        """HTML of a moment: picture, time, confidence and reason."""
+        made, number = self._made, moment.frame
         frame = next(made.film.frames(FRAME_RATE, number), None)
-        if frame is not None:
-            points, found = made.tracks.points[number], made.tracks.found[number]
-            drawn.append(drawing.draw(number, frame.picture, points, found, finger_key[number]))
-    return drawn
+        if frame is None:
+            return ""
+        finger_key = made.demonstration.plan.finger_key
+        keys = (
+            finger_key[number]
+            if number < len(finger_key)
+            else np.full((2, FINGER_COUNT), NO_KEY, np.int8)
+        )
+        points, found = made.tracks.points[number], made.tracks.found[number]
+        picture = self._drawing.draw(number, frame.picture, points, found, keys)
+        plane = made.track.at(number)
+        if plane is not None:
+            picture = self._mark(picture, plane, number)
+            picture = picture[_rows(plane, picture.shape[:2])]
+        time = f"{number / FRAME_RATE:.1f} s"
+        caption = (
+            f"<strong>{time}</strong>, confidence {moment.confidence:.2f}: {escape(moment.reason)}"
+        )
+        source = data_url("image/jpeg", _jpeg(picture))
+        return (
+            f'<figure><img alt="keys and hands at {time}" src="{source}">'
+            f"<figcaption>{caption}</figcaption></figure>"
+        )
+
+    def _mark(self, picture: NDArray[np.uint8], plane: Plane, number: int) -> NDArray[np.uint8]:
+        """Frame the keys of notes that no finger is on, of those that sound in a frame."""
+        score, supported = self._made.demonstration.score, self._made.confidence.supported
+        first, end = score.note_frames().T
+        image = Image.fromarray(picture)
+        pen = ImageDraw.Draw(image)
+        width = max(3, picture.shape[1] // 400)
+        for key in score.key[(first <= number) & (number < end) & ~supported]:
+            corners = plane.to_pixels(key_outline(int(key)))
+            pen.polygon([tuple(corner) for corner in corners.tolist()], outline=_MARK, width=width)
+        return np.asarray(image, np.uint8)
 
 
-def _png(picture: NDArray[np.uint8]) -> bytes:
+def _rows(plane: Plane, size: tuple[int, ...]) -> slice:
+    """The rows of a picture in which keys and hands are."""
+    ends = key_centres()[[0, -1], 1]
+    corners = plane.to_pixels(np.array([[x, y] for x in _SHOWN_X for y in ends]))
+    low, high = np.clip(np.sort(corners[:, 1])[[0, -1]], 0, size[0]).astype(int)
+    # A plane that is far off may be outside the picture: then all of it is shown.
+    return slice(low, high) if high > low + size[0] // 10 else slice(None)
+
+
+def _jpeg(picture: NDArray[np.uint8]) -> bytes:
     file = io.BytesIO()
-    Image.fromarray(picture).save(file, "png")
+    Image.fromarray(picture).save(file, "jpeg", quality=_JPEG_QUALITY)
     return file.getvalue()

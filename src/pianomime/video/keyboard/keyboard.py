@@ -59,14 +59,18 @@ class Keyboard:
     __repr__ = short_repr
 
     def describe(self) -> str:
-        """One line for the user."""
-        keys = np.flatnonzero(self.seen)
-        mirror = ", mirrored" if self.mirrored else ""
+        """One line for the user: which keys were found, and how well their edges fit."""
         return (
-            f"keys {key_name(int(keys[0]))} to {key_name(int(keys[-1]))} "
-            f"({len(keys)} of {KEYS}){mirror}, edges within {self.error_metres * 1000:.1f} mm "
+            f"{self.describe_keys()}, edges within {self.error_metres * 1000:.1f} mm "
             f"({self.error_pixels:.1f} pixels)"
         )
+
+    def describe_keys(self) -> str:
+        """Which keys were found; their edges would fit a wrong naming as well."""
+        keys = np.flatnonzero(self.seen)
+        mirror = ", mirrored" if self.mirrored else ""
+        names = f"keys {key_name(int(keys[0]))} to {key_name(int(keys[-1]))}"
+        return f"{names} ({len(keys)} of {KEYS}){mirror}"
 
 
 def find_keyboards(

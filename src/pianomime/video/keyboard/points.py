@@ -60,9 +60,16 @@ class NamedPoints:
     error_metres: float
 
     def describe(self) -> str:
-        """One line for the user."""
-        wrong = f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
-        return f"{len(self.names)} points, within {self.error_metres * 1000:.1f} mm{wrong}"
+        """One line for the user: how many points, and how well they fit one plane."""
+        within = f", within {self.error_metres * 1000:.1f} mm"
+        return f"{len(self.names)} points{within}{self._left_out()}"
+
+    def describe_points(self) -> str:
+        """How many points; they would fit one plane as well if all were named wrongly."""
+        return f"{len(self.names)} marked points{self._left_out()}"
+
+    def _left_out(self) -> str:
+        return f"; left out: {', '.join(self.left_out)}" if self.left_out else ""
 
 
 def place_of(name: str) -> NDArray[np.float64]:

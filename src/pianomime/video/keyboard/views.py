@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.errors import InputError
 from pianomime.progress import Progress
 from pianomime.short_repr import short_repr
 from pianomime.video.film.background import median_of, sampled
@@ -58,7 +57,7 @@ class _Found:
 
 def view_of_points(points: NamedPoints, film: Film) -> View:
     """The keyboard where a person has marked it, of a camera that does not move."""
-    return View(KeyboardTrack.still(points.plane.zoomed(1 / film.zoom)), points.describe())
+    return View(KeyboardTrack.still(points.plane.zoomed(1 / film.zoom)), points.describe_points())
 
 
 def find_views(
@@ -74,10 +73,8 @@ def find_views(
         progress: called in the phase "keyboard", frame by frame where the camera moves.
 
     Returns:
-        The ways to see the keyboard, the likeliest first: one, or one for each possible naming.
-
-    Raises:
-        InputError: no keyboard is found.
+        The ways to see the keyboard, the likeliest first: one, or one for each possible naming;
+        none if no keyboard is found.
     """
     progress("keyboard", 0, 0)
     pictures = sampled(film)
@@ -85,7 +82,7 @@ def find_views(
     keyboards = find_keyboards(background, octave, mirrored)
     if keyboards and stands_still(pictures, background, keyboards[0].plane):
         return [
-            View(KeyboardTrack.still(keyboard.plane), keyboard.describe(), tuple(keyboards))
+            View(KeyboardTrack.still(keyboard.plane), keyboard.describe_keys(), tuple(keyboards))
             for keyboard in keyboards
         ]
     del pictures
@@ -97,21 +94,10 @@ def find_views(
         if named:
             found.append(_Found(stretch, named))
     if not found:
-        raise InputError(f"{film.path}: {_not_found(octave, mirrored)}")
+        return []
     # The stretch that leaves least open tells how the others are named.
     anchor = max(found, key=lambda each: (-len(each.keyboards), len(each.stretch.frames)))
     return [_view(found, anchor, keyboard, frames) for keyboard in anchor.keyboards]
-
-
-def _not_found(octave: int | None, mirrored: bool | None) -> str:
-    """What to do where no keyboard is found."""
-    told = [f"--octave {octave}"] if octave is not None else []
-    if mirrored is not None:
-        told.append("--mirrored" if mirrored else "--not-mirrored")
-    where = "mark where it is with `pianomime pick`"
-    if told:
-        return f"no keyboard found that agrees with {' '.join(told)}; give another, or {where}"
-    return f"no keyboard found; {where}"
 
 
 def _view(found: list[_Found], anchor: _Found, keyboard: Keyboard, frames: int) -> View:
@@ -128,7 +114,7 @@ def _view(found: list[_Found], anchor: _Found, keyboard: Keyboard, frames: int) 
             which[frame] = len(planes)
             planes.append(Plane(named.plane.matrix @ np.linalg.inv(moved)))
         backgrounds.append((each.stretch.background, named.plane))
-    told = f"{keyboard.describe()}, followed through {_pictures(found)}"
+    told = f"{keyboard.describe_keys()}, followed through {_pictures(found)}"
     track = KeyboardTrack(tuple(planes), which, tuple(backgrounds))
     return View(track, told, tuple(anchor.keyboards), tuple(guessed))
 

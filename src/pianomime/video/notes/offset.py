@@ -24,10 +24,6 @@ LATE_SOUND, LATEST_SOUND = 0.5, 3.0
 _UNUSUAL = 0.8
 """Weight of the evidence for an unusual offset: music is much like itself some beats later."""
 
-_MATCH = 0.7
-"""Least share of notes with a finger on their key for a MIDI file to be what is played."""
-_ABOVE_CHANCE = 0.15
-"""Least difference of that share from the one by chance."""
 _INSIDE = 0.5
 """Least overlap of music and video, as a share of the shorter one."""
 
@@ -45,11 +41,6 @@ class Offset:
     seconds: float
     touched: float
     by_chance: float
-
-    @property
-    def matches(self) -> bool:
-        """Whether the file probably is what is played."""
-        return self.touched >= _MATCH and self.touched >= self.by_chance + _ABOVE_CHANCE
 
 
 def estimate_offset(
