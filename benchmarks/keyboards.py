@@ -5,8 +5,8 @@
 
 It needs the reference data (PIANOMIME_SHARED): frames with the places of white keys, marked by eye,
 and a film whose plane is known. `right`: every key has its name and is in its place (half a white
-key on frames, 6 mm on variants), and no doubt is said. `wrong`: it is not, without a word. `doubt`:
-refused, or more than one naming is said to be possible.
+key on frames; 6 mm on variants, in every frame of those whose camera moves), and no doubt is said.
+`wrong`: it is not, without a word. `doubt`: refused, or several namings are said to be possible.
 """
 
 from __future__ import annotations
@@ -24,18 +24,24 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 import common
-from pianomime.keyboard import BLACK, key_name
+from pianomime.keyboard import BLACK, FRAME_RATE, key_name
+from pianomime.progress import no_progress
 from pianomime.video.film.background import median_of
 from pianomime.video.film.film import Film
 from pianomime.video.keyboard.geometry import LEFT_EDGE, WHITE_WIDTH
 from pianomime.video.keyboard.keyboard import Keyboard, find_keyboards
 from pianomime.video.keyboard.plane import Plane
+from pianomime.video.keyboard.views import find_views
 from pianomime.world.parameters import key_centres
 
 _COUNT = 25
 """Pictures of the film of which each variant is made."""
 _NEAR = 0.006
 """[m] Greatest error of a key's place in a variant."""
+_SECONDS = 12.0
+"""[s] Length of the variants whose camera moves."""
+_UNSEEN = 0.02
+"""Most frames in which a keyboard that is there may be missed, as a share."""
 _WHITES_BELOW = np.cumsum(~BLACK) - 1
 Pictures = list[NDArray[np.uint8]]
 
@@ -68,7 +74,7 @@ def _rows(shared: Path, only: list[str]) -> Iterator[dict[str, Any]]:
             kind = "frames" if truth["keyboard"] else "frames without a keyboard"
             yield {"kind": kind, "name": name, **_judge_frame(truth, found)}
     stan = shared / "data" / "stan"
-    wanted = [name for name in VARIANTS if any(part in name for part in only)]
+    wanted = [name for name in (*VARIANTS, *MOVING) if any(part in name for part in only)]
     if not wanted:
         return
     swap = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
@@ -76,6 +82,9 @@ def _rows(shared: Path, only: list[str]) -> Iterator[dict[str, Any]]:
     film = Film(stan / "Stan_1.mp4")
     pictures = film.sample(_COUNT)
     for name in wanted:
+        if name in MOVING:
+            yield {"kind": "variants", "name": name, **_moving(film, plane, MOVING[name])}
+            continue
         if name.endswith("frames/s"):
             seconds = film.seconds / _COUNT
             rate = float(name.split()[0])
@@ -107,6 +116,45 @@ def _judge_frame(truth: dict[str, Any], found: list[Keyboard]) -> dict[str, Any]
     right = bool(np.abs(off - octave).max() < 0.6) and found[0].mirrored == truth["mirrored"]
     verdict = ("right" if right else "wrong") if len(found) == 1 else "doubt"
     return {"verdict": verdict, "said": _said(found)}
+
+
+def _moving(film: Film, plane: Plane, move: Callable[[float], Any]) -> dict[str, Any]:
+    """The verdict on a variant whose camera moves: written as a film, and judged in all frames."""
+    frames = round(_SECONDS * FRAME_RATE)
+    moved = [move(number / frames) for number in range(frames)]
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "film.mp4")
+        with av.open(str(path), "w") as container:
+            stream = container.add_stream("libx264", rate=round(FRAME_RATE), options={"crf": "23"})
+            stream.width, stream.height, stream.pix_fmt = 1280, 720, "yuv420p"
+            for way, frame in zip(moved, film.frames(FRAME_RATE), strict=False):
+                card = np.full_like(frame.picture, 240)
+                shown = card if way is None else _warp([frame.picture], way)[0][0]
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(shown)))
+            container.mux(stream.encode())
+        views = find_views(Film(path), frames, None, None, no_progress)
+    if len(views) != 1:
+        return {"verdict": "doubt", "said": f"{len(views)} namings"}
+    view = views[0]
+    told = bool(view.guessed) or len(view.namings) > 1
+    keys = key_centres()[:, :2]
+    worst, unseen, phantoms = 0.0, 0, 0
+    for number, way in enumerate(moved):
+        found = view.track.at(number)
+        if way is None or found is None:
+            phantoms += way is None and found is not None
+            unseen += way is not None and found is None
+            continue
+        pixels = Plane(plane.matrix @ np.linalg.inv(way)).to_pixels(keys)
+        visible = ((pixels > 0) & (pixels < (1280, 720))).all(axis=1)
+        off = np.linalg.norm(found.to_world(pixels[visible]) - keys[visible], axis=1)
+        worst = max(worst, float(off.max()))
+    right = worst < _NEAR and not phantoms and unseen < _UNSEEN * frames
+    said = (
+        f"{view.description}; at most {1000 * worst:.1f} mm off in {frames} frames; keyboard not "
+        f"found in {unseen}, found on a card in {phantoms}"
+    )
+    return {"verdict": "doubt" if told else ("right" if right else "wrong"), "said": said}
 
 
 def _judge(truth: Plane, shape: tuple[int, ...], found: list[Keyboard]) -> dict[str, Any]:
@@ -236,38 +284,44 @@ def _letterbox(pictures: Pictures) -> Any:
     return _warp(pictures, _scaled(0.75, 0.75, 160, 90))
 
 
-def _title(pictures: Pictures) -> Any:
-    card = Image.new("RGB", pictures[0].shape[1::-1], (250, 250, 250))
-    ImageDraw.Draw(card).text((300, 300), "A piece for piano", fill=(10, 10, 10), font_size=80)
-    first = len(pictures) // 5
-    return [np.asarray(card)] * first + pictures[first:], np.eye(3)
+def _title(part: float) -> Any:
+    """A fifth of the film is a title card."""
+    return None if part < 0.2 else np.eye(3)
 
 
-def _cut(pictures: Pictures) -> Any:
+def _cut(part: float) -> Any:
     """Two fifths are nearer."""
-    first = len(pictures) * 3 // 5
-    near, _ = _warp(pictures[first:], _scaled(1.4, 1.4, -256, -144))
-    return pictures[:first] + near, np.eye(3)
+    return np.eye(3) if part < 0.6 else _scaled(1.4, 1.4, -256, -144)
 
 
-def _shake(pictures: Pictures) -> Any:
-    draw = np.random.default_rng(0)
-    moves = draw.uniform(-4, 4, (len(pictures), 2))
-    return [
-        _warp([picture], _scaled(1, 1, *move))[0][0]
-        for picture, move in zip(pictures, moves, strict=True)
-    ], np.eye(3)
+def _shake(part: float) -> Any:
+    """By up to 4 pixels, from each frame to the next."""
+    draw = np.random.default_rng(round(1e6 * part))
+    return _scaled(1, 1, *draw.uniform(-4, 4, 2))
 
 
-def _drift(pictures: Pictures) -> Any:
+def _drift(part: float) -> Any:
     """Held in a hand: it turns by 3 degrees and moves by 25 pixels from beginning to end."""
-    parts = np.linspace(-0.5, 0.5, len(pictures))
-    return [
-        _warp([picture], _turning(3 * part, 25 * part))[0][0]
-        for picture, part in zip(pictures, parts, strict=True)
-    ], np.eye(3)
+    return _turning(3 * (part - 0.5), 25 * (part - 0.5))
 
 
+def _unsteady(part: float) -> Any:
+    """The same, and it sways, turns and nears as hands do, within a second."""
+    at = part * _SECONDS
+    sway = _scaled(1, 1, 6 * np.sin(5 * at), 4 * np.sin(7.3 * at + 1))
+    near = 1 + 0.01 * np.sin(4.1 * at)
+    middle = _scaled(1, 1, 640, 360) @ _scaled(near, near) @ _scaled(1, 1, -640, -360)
+    return sway @ middle @ _drift(part) @ _turning(0.5 * np.sin(6.1 * at))
+
+
+MOVING: dict[str, Callable[[float], Any]] = {
+    "title card": _title,
+    "cut with zoom": _cut,
+    "shake of 4 pixels": _shake,
+    "hand-held drift": _drift,
+    "hand-held, unsteady": _unsteady,
+}
+"""Variants whose camera moves: by part of the film, 0..1, the homography; None for a card."""
 VARIANTS: dict[str, Callable[[Pictures], Any]] = {
     "as it is": _light(1, 1, 1),
     "right 60 %": lambda p: _warp(p, _scaled(1, 1, -512), (768, 720)),
@@ -289,10 +343,6 @@ VARIANTS: dict[str, Callable[[Pictures], Any]] = {
     "10 frames/s": _light(1, 1, 1),
     "watermark": _watermark,
     "letterbox": _letterbox,
-    "title card": _title,
-    "cut with zoom": _cut,
-    "shake of 4 pixels": _shake,
-    "hand-held drift": _drift,
     "an octave in shade": _shade,
 }
 """The variants: pictures, and the homography of pixels by which they were moved."""
