@@ -44,8 +44,8 @@ _LONG_END = 2.0
 _OCTAVE = 12
 """Semitones."""
 
-SOUND = "sound"
-"""What the notes are from, if not from a MIDI file or the keys."""
+SOUND, KEYS_AND_SOUND = "sound", "video, from keys that light up, and its sound"
+"""What the notes are from, if not from a MIDI file or from keys alone."""
 
 Weight = Literal["note", "check", "wrong"]
 """What a remark means for the whole: nothing; that a user should check something; or that the
@@ -114,7 +114,7 @@ def no_keyboard(video: Path, told: Sequence[str] = ()) -> str:
         )
     return (
         f"{video}: no keyboard found; try a film that shows more keys, sharp, from above, by a "
-        f"camera that stands still ({show} shows what is looked at), or {mark}"
+        f"camera that moves less ({show} shows what is looked at), or {mark}"
     )
 
 
@@ -129,7 +129,7 @@ def on_naming(keyboards: Sequence[Keyboard]) -> list[Remark]:
         return remarks
     assumed, *others = keyboards
     if any(other.lowest_c != assumed.lowest_c for other in others):
-        text = f"the video leaves the octave open: its lowest C is taken for C{assumed.lowest_c}"
+        text = f"the video leaves the octave open: {_lowest(assumed)}"
         action = "name it with --octave; a MIDI file would decide"
         remarks.append(Remark(text, action, "check"))
     if any(other.mirrored != assumed.mirrored for other in others):
@@ -142,12 +142,19 @@ def on_naming(keyboards: Sequence[Keyboard]) -> list[Remark]:
     return remarks
 
 
+def _lowest(keyboard: Keyboard) -> str:
+    """What the lowest key that is seen is taken for, in words; a C where there is one."""
+    if keyboard.lowest_c is not None:
+        return f"its lowest C is taken for C{keyboard.lowest_c}"
+    return f"its lowest key is taken for {key_name(int(np.flatnonzero(keyboard.seen)[0]))}"
+
+
 def on_stretches(view: View) -> list[Remark]:
     """Remarks on stretches of a film whose octave is not sure."""
     return [
         Remark(
             f"from {frame / FRAME_RATE:.1f} s on the camera shows a part of the keyboard whose "
-            f"octave is a guess: its lowest C is taken for C{keyboard.lowest_c}",
+            f"octave is a guess: {_lowest(keyboard)}",
             "look at the overlay from there; if it is wrong, cut the video there",
             "check",
         )
@@ -163,8 +170,8 @@ def on_unseen_keyboard(missing: NDArray[np.bool_]) -> list[Remark]:
     """
     return [
         Remark(
-            f"no keyboard is seen from {first:.1f} s to {end:.1f} s: that is left out",
-            "nothing if other pictures are shown there",
+            f"no keyboard is seen from {first:.1f} s to {end:.1f} s: nothing is known there",
+            "nothing if other pictures are shown there; else take a film that shows the keyboard",
         )
         for first, end in intervals(missing)
     ]
@@ -359,6 +366,8 @@ def on_agreement(confidence: Confidence, source: str, offset: float | None) -> l
         source: what the notes are from: the name of a MIDI file, `SOUND`, or else keys.
         offset: offset of a MIDI file or of the sound [s]; None for notes of the keys.
     """
+    if source == KEYS_AND_SOUND:
+        offset = None  # their time is that of the light; the offset is the sound's
     agreed, better = confidence.agreement, confidence.better
     if better is not None and better.keys:
         far = abs(better.keys)

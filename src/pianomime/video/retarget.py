@@ -38,7 +38,7 @@ from pianomime.video.keyboard.track import KeyboardTrack
 from pianomime.video.keyboard.views import View, find_views, view_of_points
 from pianomime.video.keyboard_look import KeyboardLook, look_at_keyboard
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
-from pianomime.video.notes.fusion import fuse
+from pianomime.video.notes.fusion import Fused, fuse
 from pianomime.video.notes.heard import check_heard
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.offset import LATE_SOUND, LATEST_SOUND, Offset, estimate_offset
@@ -434,10 +434,10 @@ def _from_video(
     _check_hands(given, tracks)
     read = read_notes(lights[0], tracks, title_of(given.film.path))
     if read.lit:
-        timed = _read_score(read)
+        taken = _Taken(0, tracks, _read_score(read), tuple(remark.on_naming(view.namings)))
         if given.may_listen:
-            timed = _fused(given, timed, progress)
-        return _Taken(0, tracks, timed, tuple(remark.on_naming(view.namings)))
+            return _fused(given, views, taken, sightings, lights, progress)
+        return taken
     advice = "give that with --midi FILE"
     if given.may_listen:
         try:
@@ -466,27 +466,63 @@ def _read_score(read: ReadNotes) -> _Timed:
     return _Timed(on_grid(read.score), facts, [], read.confidence)
 
 
-def _fused(given: _Given, timed: _Timed, progress: Progress) -> _Timed:
-    """The notes of keys that light up, with what the sound says of them where it is theirs."""
+def _fused(
+    given: _Given,
+    views: list[View],
+    taken: _Taken,
+    sightings: Sightings,
+    lights: list[LightRecord],
+    progress: Progress,
+) -> _Taken:
+    """The notes of keys that light up, with what the sound says of them where it is theirs.
+
+    What the video leaves open of the names of the keys, the sound decides.
+
+    Args:
+        given: the files.
+        views: the ways to see the keyboard.
+        taken: the notes as seen in the first view.
+        sightings: hands in each frame.
+        lights: of each view.
+        progress: called while it listens.
+    """
+    timed = taken.timed
     try:
         heard = given.heard(progress)
     except InputError as error:
         said = remark.on_unused_sound(f"{error}".removeprefix(f"{given.film.path}: "))
-        return replace(timed, remarks=[*timed.remarks, *said])
+        return taken._replace(timed=replace(timed, remarks=[*timed.remarks, *said]))
     early = given.config.offset
-    fused = fuse(timed.score, heard, None if early is None else -early)
-    remarks = [*timed.remarks, *remark.on_fused(fused)]
+    ways: list[tuple[_Taken, Fused]] = []
+    for number, (view, light) in enumerate(zip(views, lights, strict=True)):
+        way = taken
+        if number:
+            tracks = follow(sightings, given.film.working_size, view.track)
+            read = read_notes(light, tracks, title_of(given.film.path))
+            way = _Taken(number, tracks, _read_score(read))
+        ways.append((way, fuse(way.timed.score, heard, None if early is None else -early)))
+    most = max(fused.both for _, fused in ways)
+    near = [way for way in ways if way[1].both >= most - _BETTER * len(timed.score)]
+    # The likeliest of those that the sound does not tell apart.
+    best, fused = near[0]
+    timed = best.timed
+    remarks = [*timed.remarks, *(Remark(text) for text in heard.remarks), *remark.on_fused(fused)]
     if not fused.alike:
-        return replace(timed, remarks=remarks)
+        return taken._replace(timed=replace(taken.timed, remarks=remarks))
     facts = {
         **timed.facts,
-        "notes_from": "video, from keys that light up, and its sound",
+        "notes_from": remark.KEYS_AND_SOUND,
         "offset_seconds": round(-fused.late, 4),
         "notes_seen_and_heard": fused.both,
         "notes_only_seen": fused.only_seen,
         "notes_only_heard": fused.only_heard,
     }
-    return replace(timed, score=on_grid(fused.score), facts=facts, remarks=remarks)
+    return _Taken(
+        best.view,
+        best.tracks,
+        replace(timed, score=on_grid(fused.score), facts=facts, remarks=remarks),
+        taken.guessed if len(near) > 1 else (),
+    )
 
 
 def _place(given: _Given, score: Score, offset: Offset, seconds: float) -> _Timed:

@@ -32,7 +32,7 @@ _ORDER = 4.0
 _HISTORIES = 3
 """Width of the beam."""
 FEWEST = 0.05
-"""Share of the frames in which a hand must be detected to be taken for one."""
+"""Share of the frames with a keyboard in which a hand must be detected to be taken for one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +122,9 @@ def follow(
         swaps += swapped
         ghosts += len(hands) - sum(which >= 0 for which in pick)
     found: NDArray[np.bool_] = np.asarray(np.isfinite(points).all(axis=(2, 3)))
+    watched = len(seen) - int(track.missing(len(seen)).sum())
     for hand in (LEFT, RIGHT):
-        if found[:, hand].mean() < FEWEST:
+        if found[:, hand].sum() < FEWEST * watched:
             ghosts += int(found[:, hand].sum())
             points[:, hand], found[:, hand] = np.nan, False
     mended: NDArray[np.bool_] = np.zeros(points.shape[:3], bool)

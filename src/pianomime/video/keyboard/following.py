@@ -33,7 +33,7 @@ _STILL_SHARE = 0.9
 _LEAVING = 0.6
 """Share of a template in the picture below which another one is taken."""
 _MOST_STRETCHES = 8
-"""Most stretches that are compared with a picture: those seen last."""
+"""Most stretches that are compared with a picture: those seen last. Earlier ones are done."""
 _PICTURES = 15
 """Most pictures of which the background of a stretch is made."""
 _SHORTEST = 1.0
@@ -42,7 +42,7 @@ _WAIT, _LONGEST_WAIT = 0.5, 8.0
 """[s] Time after which a keyboard is looked for again where there was none; it doubles each time,
 up to the second."""
 _OTHER = 0.06
-"""Mean difference of brightness, 0..1, from which on a picture is another one: after a cut."""
+"""Mean difference of brightness, 0..1, from one frame to the next from which on there is a cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,28 +103,31 @@ def follow_keyboard(film: Film, most: int, progress: Progress) -> tuple[list[Str
     """
     number = -1
     known: list[_Camera] = []
+    done: list[Stretch] = []
     search = _Search()
     total = round(film.seconds * FRAME_RATE)
     for number, frame in enumerate(islice(film.frames(FRAME_RATE), most)):
         progress("keyboard", number + 1, max(total, number + 1))
         pyramid = Pyramid(frame.picture)
-        for camera in known[:_MOST_STRETCHES]:
+        due = search.is_due(number, pyramid)
+        for camera in known:
             if camera.sees(number, frame.picture, pyramid):
                 # Those seen last are compared first.
                 known.remove(camera)
                 known.insert(0, camera)
                 break
         else:
-            if search.is_due(number, pyramid):
+            if due:
                 keyboards = find_keyboards(median_of([frame.picture]))
-                search.done(number, pyramid, bool(keyboards))
+                search.done(number, bool(keyboards))
                 if keyboards:
                     camera = _Camera(keyboards[0].plane, pyramid)
                     camera.add(number, frame.picture, np.eye(3))
                     known.insert(0, camera)
-    stretches = [
-        camera.stretch() for camera in known if len(camera.frames) >= _SHORTEST * FRAME_RATE
-    ]
+                    # To save memory: a film may have hundreds of cuts.
+                    done += [camera.stretch() for camera in known[_MOST_STRETCHES:] if camera.lasts]
+                    del known[_MOST_STRETCHES:]
+    stretches = done + [camera.stretch() for camera in known if camera.lasts]
     return sorted(stretches, key=lambda stretch: int(stretch.frames[0])), number + 1
 
 
@@ -134,18 +137,24 @@ class _Search:
 
     due: float = 0.0
     wait: float = _WAIT
-    looked: NDArray[np.float32] | None = None
+    soonest: float = 0.0
+    before: NDArray[np.float32] | None = None
 
     def is_due(self, frame: int, pyramid: Pyramid) -> bool:
-        """Whether it is time, or the picture is another one than the last that was looked at."""
-        if self.looked is not None and np.abs(pyramid.levels[0] - self.looked).mean() > _OTHER:
-            self.wait = _WAIT
-            return True
+        """Whether it is time, or there was a cut; never soon after the last search.
+
+        Args:
+            frame: its number; each is asked for once, in order.
+            pyramid: the frame.
+        """
+        before, self.before = self.before, pyramid.levels[0]
+        if before is not None and np.abs(pyramid.levels[0] - before).mean() > _OTHER:
+            self.due = min(self.due, max(frame, self.soonest))
         return frame >= self.due
 
-    def done(self, frame: int, pyramid: Pyramid, found: bool) -> None:
+    def done(self, frame: int, found: bool) -> None:
         """Note that a picture was looked at."""
-        self.looked = pyramid.levels[0]
+        self.soonest = frame + _WAIT * FRAME_RATE
         self.due = frame + self.wait * FRAME_RATE
         self.wait = _WAIT if found else min(2 * self.wait, _LONGEST_WAIT)
 
@@ -172,6 +181,11 @@ class _Camera:
         self._template = Template(self.first, self.plane)
         self._base = np.eye(3)
         self._step = 1
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it has been seen for long enough."""
+        return len(self.frames) >= _SHORTEST * FRAME_RATE
 
     def sees(self, frame: int, picture: NDArray[np.uint8], pyramid: Pyramid) -> bool:
         """Whether a frame shows its keyboard; if so, it is added."""
