@@ -19,7 +19,7 @@ from pianomime.progress import Progress
 from pianomime.short_repr import short_repr
 from pianomime.video.film.background import median_of
 from pianomime.video.film.film import Film
-from pianomime.video.keyboard.keyboard import find_keyboards
+from pianomime.video.keyboard.keyboard import Keyboard, find_keyboards
 from pianomime.video.keyboard.plane import Plane
 from pianomime.video.keyboard.registration import Pyramid, Template
 from pianomime.world.parameters import key_centres
@@ -41,6 +41,8 @@ _SHORTEST = 1.0
 _WAIT, _LONGEST_WAIT = 0.5, 8.0
 """[s] Time after which a keyboard is looked for again where there was none; it doubles each time,
 up to the second."""
+_AFTER_CUT = 1 / 8
+"""Part of that time after which a keyboard is looked for again after a cut."""
 _OTHER = 0.06
 """Mean difference of brightness, 0..1, from one frame to the next from which on there is a cut."""
 
@@ -54,11 +56,13 @@ class Stretch:
         moved: (n, 3, 3) homography of pixels (column, row, 1) to each frame, from `background`.
         background: (height, width, 3) uint8, what most of the frames show, without hands, as seen
             in the first one.
+        keyboards: those in the first frame, with hands, as `find_keyboards` gives them.
     """
 
     frames: NDArray[np.int64]
     moved: NDArray[np.float64]
     background: NDArray[np.uint8]
+    keyboards: tuple[Keyboard, ...]
 
     __repr__ = short_repr
 
@@ -121,7 +125,7 @@ def follow_keyboard(film: Film, most: int, progress: Progress) -> tuple[list[Str
                 keyboards = find_keyboards(median_of([frame.picture]))
                 search.done(number, bool(keyboards))
                 if keyboards:
-                    camera = _Camera(keyboards[0].plane, pyramid)
+                    camera = _Camera(tuple(keyboards), pyramid)
                     camera.add(number, frame.picture, np.eye(3))
                     known.insert(0, camera)
                     # To save memory: a film may have hundreds of cuts.
@@ -154,7 +158,7 @@ class _Search:
 
     def done(self, frame: int, found: bool) -> None:
         """Note that a picture was looked at."""
-        self.soonest = frame + _WAIT * FRAME_RATE
+        self.soonest = frame + _AFTER_CUT * self.wait * FRAME_RATE
         self.due = frame + self.wait * FRAME_RATE
         self.wait = _WAIT if found else min(2 * self.wait, _LONGEST_WAIT)
 
@@ -164,21 +168,21 @@ class _Camera:
     """A stretch while it grows.
 
     Attributes:
-        plane: of the keyboard in its first frame; the names of the keys may be wrong.
+        keyboards: in its first frame, in each way to name the keys.
         first: that frame.
         frames: the frames so far.
         moved: for each the homography of pixels from the first.
         pictures: some of the frames, with their homographies.
     """
 
-    plane: Plane
+    keyboards: tuple[Keyboard, ...]
     first: Pyramid
     frames: list[int] = field(default_factory=list)
     moved: list[NDArray[np.float64]] = field(default_factory=list)
     pictures: list[tuple[NDArray[np.uint8], NDArray[np.float64]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._template = Template(self.first, self.plane)
+        self._template = Template(self.first, self.keyboards[0].plane)
         self._base = np.eye(3)
         self._step = 1
 
@@ -200,7 +204,7 @@ class _Camera:
                 self.add(frame, picture, found.matrix @ self._base)
                 if found.visible < _LEAVING:
                     self._base = self.moved[-1]
-                    seen = Plane(self.plane.matrix @ np.linalg.inv(self._base))
+                    seen = Plane(self.keyboards[0].plane.matrix @ np.linalg.inv(self._base))
                     self._template = Template(pyramid, seen)
                 return True
         return False
@@ -225,7 +229,10 @@ class _Camera:
             [np.median([picture[row] for picture in steady], axis=0) for row in range(len(first))]
         )
         return Stretch(
-            np.array(self.frames, np.int64), np.array(self.moved), background.astype(np.uint8)
+            np.array(self.frames, np.int64),
+            np.array(self.moved),
+            background.astype(np.uint8),
+            self.keyboards,
         )
 
 

@@ -89,8 +89,10 @@ def find_views(
     stretches, frames = follow_keyboard(film, most, progress)
     found = []
     for stretch in stretches:
-        # A picture with hands is enough to follow a keyboard; its keys are named without them.
+        # Keys are named in a picture without hands, unless it is too blurred.
         named = find_keyboards(median_of([stretch.background]), octave, mirrored)
+        if not named and octave is None and mirrored is None:
+            named = list(stretch.keyboards)
         if named:
             found.append(_Found(stretch, named))
     if not found:
