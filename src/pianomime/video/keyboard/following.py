@@ -26,6 +26,8 @@ from pianomime.world.parameters import key_centres
 
 _ALIKE = 0.7
 """Likeness from which on a keyboard is the one that was seen before."""
+_SURELY = 0.85
+"""Likeness from which on it is certainly where it was found."""
 _STILL = 0.003
 """[m] Movement of keys that is none: an eighth of the width of a white key."""
 _STILL_SHARE = 0.9
@@ -194,20 +196,25 @@ class _Camera:
     def sees(self, frame: int, picture: NDArray[np.uint8], pyramid: Pyramid) -> bool:
         """Whether a frame shows its keyboard; if so, it is added."""
         last = self.moved[-1]
-        guesses = [last]
-        if len(self.moved) > 1 and self.frames[-1] == frame - 1:
-            # As it moved before.
-            guesses.insert(0, last @ np.linalg.inv(self.moved[-2]) @ last)
-        for guess in guesses:
-            found = self._template.find(pyramid, guess @ np.linalg.inv(self._base))
-            if found is not None and found.likeness >= _ALIKE:
-                self.add(frame, picture, found.matrix @ self._base)
-                if found.visible < _LEAVING:
-                    self._base = self.moved[-1]
-                    seen = Plane(self.keyboards[0].plane.matrix @ np.linalg.inv(self._base))
-                    self._template = Template(pyramid, seen)
-                return True
-        return False
+        best = self._template.find(pyramid, last @ np.linalg.inv(self._base))
+        if (
+            (best is None or best.likeness < _SURELY)
+            and len(self.moved) > 1
+            and self.frames[-1] == frame - 1
+        ):
+            # It may have moved as it did before.
+            guess = last @ np.linalg.inv(self.moved[-2]) @ last
+            other = self._template.find(pyramid, guess @ np.linalg.inv(self._base))
+            if best is None or (other is not None and other.likeness > best.likeness):
+                best = other
+        if best is None or best.likeness < _ALIKE:
+            return False
+        self.add(frame, picture, best.matrix @ self._base)
+        if best.visible < _LEAVING:
+            self._base = self.moved[-1]
+            seen = Plane(self.keyboards[0].plane.matrix @ np.linalg.inv(self._base))
+            self._template = Template(pyramid, seen)
+        return True
 
     def add(self, frame: int, picture: NDArray[np.uint8], moved: NDArray[np.float64]) -> None:
         """Add a frame."""
