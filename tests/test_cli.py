@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from one_line import fails
 from pianomime import Performance, songs
 from pianomime.cli import COMMANDS, main
 from pianomime.errors import TrainingDiverged
@@ -21,19 +22,6 @@ from pianomime.errors import TrainingDiverged
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Run in an empty folder; nothing but what a test asks for may be left there."""
     monkeypatch.chdir(tmp_path)
-
-
-def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    """Run, expect exit code 2 and one line on stderr, and return that line."""
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    assert stopped.value.code == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    lines = printed.err.splitlines()
-    assert len(lines) == 1, printed.err
-    assert lines[0].startswith("pianomime: ")
-    return lines[0]
 
 
 def test_help_is_there_and_cheap() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from made_up_listener import Teller, tone
+from one_line import fails
 from pianomime.cli import main
 from pianomime.music import Score
 from pianomime.transcription import listener
@@ -31,16 +32,6 @@ def told(monkeypatch: pytest.MonkeyPatch) -> None:
     """The network's part is played by one who knows."""
     monkeypatch.setattr(listener, "can_listen", lambda: True)
     monkeypatch.setattr("pianomime.transcription.transcribe.find_listener", lambda: Teller(SAID))
-
-
-def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    assert stopped.value.code == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert printed.err.count("\n") == 1
-    return printed.err
 
 
 @pytest.mark.usefixtures("told")

@@ -14,6 +14,7 @@ import pytest
 
 import made_up_video as made_up
 from made_up_listener import Teller, tone
+from one_line import fails
 from pianomime.cli import main
 from pianomime.errors import InputError
 from pianomime.music import Score, onset_f1
@@ -186,16 +187,6 @@ def test_a_damaged_sound(score: Score, tmp_path: Path, known: RecordingConfig) -
         read = notes_of_recording(tmp_path / "damaged.mp4", known, listener=Teller(score))
     assert 0 < len(read.score) < len(score)
     assert read.score.onset.max() < 2.7
-
-
-def fails(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    assert stopped.value.code == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert printed.err.count("\n") == 1
-    return printed.err
 
 
 @pytest.mark.usefixtures("deaf")
