@@ -23,6 +23,9 @@ from pianomime.world.parameters import key_centres
 
 _OFF_LINE = 0.003
 """[m] Edges further than this from the line through those of all keys are not of keys."""
+_LIT, _DARKEST = 0.5, 0.15
+"""Brightness from which on all of an edge's contrast counts, and the least part of it that does
+where it is darker: a part of the keyboard may lie in shade."""
 
 
 def refine(
@@ -117,7 +120,7 @@ def _find_edges(
     profile = sample(picture, plane.to_pixels(world))
     place, depth = _dip(profile, span)
     near = (whites >= reach[0]) & (whites <= reach[1])
-    good = (depth > 0.02) & near[gap]
+    good = (depth > 0.02 * _lit(profile)) & near[gap]
     pixels.append(plane.to_pixels(np.stack([row[good], whites[gap[good]] + place[good]], axis=-1)))
     axis.append(np.ones(good.sum(), int))
     value.append(whites[gap[good]])
@@ -147,7 +150,7 @@ def _find_edges(
         world = np.stack(np.broadcast_arrays(x + off, along[:, None]), axis=-1)
         profile = sample(picture, plane.to_pixels(world))
         place, height = _step(sign * profile, off)
-        good = (height > 0.06) & (along >= reach[0]) & (along <= reach[1])
+        good = (height > 0.06 * _lit(profile)) & (along >= reach[0]) & (along <= reach[1])
         if good.sum() > 3:
             # The edges of all keys are on one line; edges off that line are of a shelf or a shadow.
             at, slope = line_through(along[good], place[good])
@@ -165,6 +168,12 @@ def _find_edges(
         np.concatenate(weight),
         seen,
     )
+
+
+def _lit(profile: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(P,) Part of the contrast that brightness profiles (P, S) have in full light."""
+    brightest = np.nan_to_num(profile).max(axis=1)
+    return np.clip(brightest / _LIT, _DARKEST, 1.0)
 
 
 def _dip(
