@@ -3,7 +3,7 @@
     python benchmarks/lit_keys.py
 
 PIANOMIME_SHARED names the folder of reference data. Each film is read twice: with its hands
-(`pianomime retarget` without --midi; needs MediaPipe), and from its pictures alone
+(`pianomime retarget --notes light`; needs MediaPipe), and from its pictures alone
 (`notes_of_lit_film`). The truth is a MIDI file at the offset that `retarget` finds; where there is
 none, F1 is nan.
 """
@@ -56,7 +56,8 @@ def _truth(video: Path, midi: Path, model: Path) -> Score:
 
 
 def _with_hands(video: Path, model: Path) -> Score:
-    return retarget(video, RetargetConfig(hand_model=model)).demonstration.score
+    config = RetargetConfig(hand_model=model, notes="light")
+    return retarget(video, config).demonstration.score
 
 
 def _row(video: Path, way: str, read: Any, truth: Score | None) -> dict[str, Any]:

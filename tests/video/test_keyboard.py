@@ -95,6 +95,24 @@ def test_a_cut_end_is_not_taken_for_a_mirror():
     assert named_right(found[0], plane)
 
 
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_a_part_up_to_an_end_is_known_by_the_black_key_that_is_missing_there(end):
+    # A0 has none at its left and C8 none at its right, though nothing beyond them is seen.
+    size = (1280, 720)
+    whole = made_up.camera(size)
+    picture = grey(whole, size)
+    first, last = np.sort(whole.to_pixels(key_centres()[[0, -1], :2])[:, 0])
+    width = (last - first) / 51
+    left = round(first - 0.35 * width) if end == "low" else round(first + 21 * width)
+    part = picture[:, left : left + round(31 * width)]
+    found = find_keyboards(part)
+    assert len(found) == 1
+    pixels = whole.to_pixels(key_centres()[:, :2]) - [left, 0]
+    seen = (pixels[:, 0] > 0) & (pixels[:, 0] < part.shape[1])
+    off = found[0].plane.to_world(pixels) - key_centres()[:, :2]
+    assert np.linalg.norm(off[seen], axis=1).max() < 0.006
+
+
 @pytest.mark.parametrize("light", [0.15, 0.35])
 def test_dark_pictures(light):
     size = (1280, 720)

@@ -32,6 +32,8 @@ _SURELY = 0.6
 """Likeness from which a place is followed."""
 _FAINT = 0.008
 """Standard deviation of brightness, 0..1, below which a place shows nothing."""
+_BLACK = 0.5
+"""Brightness, of that of white, below which the average octave is black."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +45,16 @@ class KeyEvidence:
         likeness: (P,) correlation with the keyboard's average octave; NaN outside the picture.
         faint: (P,) bool, whether the place shows nothing.
         part: (P,) part of the place that is in the picture.
+        bare: (P, 2) logarithm of the odds that the black key at the left and at the right of a
+            place, where the average octave has one, is missing, as beside A0 and C8; 0 where there
+            is none, or it is outside the picture.
     """
 
     first: int
     likeness: NDArray[np.float64]
     faint: NDArray[np.bool_]
     part: NDArray[np.float64]
+    bare: NDArray[np.float64]
 
     __repr__ = short_repr
 
@@ -56,11 +62,14 @@ class KeyEvidence:
         """(P,) Logarithm of the odds that there is a key at each place; 0 outside the picture.
 
         Something else than a key may be a hand or a light on one, so it counts half as much as a
-        key does, and a place that is dark hardly counts.
+        key does, and a place that is dark hardly counts. Of a key, less counts the less of it is in
+        the picture; what is no key is none, however little of it is seen.
         """
         odds = np.clip(8 * (self.likeness - 0.45), -1.5, 3.0)
         odds = np.where(self.faint, -0.1, odds)
-        return np.asarray(np.where(self.part >= _PART, np.nan_to_num(odds) * self.part, 0.0))
+        odds = np.nan_to_num(odds)
+        odds = np.where(odds > 0, odds * self.part, odds)
+        return np.asarray(np.where(self.part >= _PART, odds, 0.0))
 
     def hidden(self) -> int:
         """Number of places between the outermost keys that are seen where no key is seen."""
@@ -84,6 +93,7 @@ def look_along(picture: NDArray[np.float32], plane: Plane, known: NDArray[np.int
     step = (np.arange(first, end) - known[0]) % _OCTAVE
     likeness, part = np.full(end - first, np.nan), np.zeros(end - first)
     faint = np.zeros(end - first, bool)
+    bare = np.zeros((end - first, 2))
     start = int(known.mean()) - first
     # Outward from the middle, so that bent pictures are followed.
     for places in (range(start, -1, -1), range(start, end - first)):
@@ -98,9 +108,12 @@ def look_along(picture: NDArray[np.float32], plane: Plane, known: NDArray[np.int
                 continue
             likeness[at], part[at], spread, moved = max(ways)
             faint[at] = spread < _FAINT
+            if not faint[at]:
+                # Where the place before it says it is: what is dark beyond an end is no black key.
+                bare[at] = _bare(strip, at * _ACROSS + slip, octave[step[at]])
             if likeness[at] > _SURELY and not faint[at]:
                 slip = moved
-    return KeyEvidence(first, likeness, faint, part)
+    return KeyEvidence(first, likeness, faint, part, bare)
 
 
 def _strip(picture: NDArray[np.float32], plane: Plane, first: int, end: int) -> NDArray[np.float64]:
@@ -160,3 +173,32 @@ def _likeness(
     some = spread * float(wanted.std())
     like = float(np.mean((seen - seen.mean()) * (wanted - wanted.mean()))) / max(some, 1e-9)
     return like, float(both.mean()), spread
+
+
+def _bare(strip: NDArray[np.float64], left: int, model: NDArray[np.float64]) -> tuple[float, float]:
+    """`KeyEvidence.bare` of a place."""
+    if left < 0 or left + _ACROSS > strip.shape[1]:
+        return 0.0, 0.0
+    rows = slice(0, _BACK_ROWS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of what is outside the picture
+        place = np.nanmedian(strip[rows, left : left + _ACROSS], axis=0)
+        wanted = np.nanmedian(model[rows], axis=0)
+    if not np.isfinite(wanted).any():
+        return 0.0, 0.0
+    white = float(np.nanmax(wanted))
+    black = wanted < _BLACK * white
+    lit = np.isfinite(place) & ~black
+    if not lit.any():
+        return 0.0, 0.0
+    middle = _ACROSS // 2
+    odds = []
+    for side in (slice(0, middle), slice(middle, _ACROSS)):
+        there = np.flatnonzero(np.isfinite(place[side]) & black[side])
+        if not len(there):
+            odds.append(0.0)
+            continue
+        missing = 1 - float(wanted[side][there].mean()) / white
+        dark = 1 - float(place[side][there].mean()) / max(float(place[lit].mean()), _FAINT)
+        odds.append(float(np.clip(8 * (0.5 - dark / missing), -3.0, 3.0)))
+    return odds[0], odds[1]

@@ -22,16 +22,16 @@ _MIRROR = 3.0
 """How much better a mirrored naming must be: films are hardly ever mirrored."""
 _END = float(np.log(_OCTAVE))
 """For an end of the keyboard where the keys cease: by chance it would be any key of an octave."""
-_BEYOND = 1.0
+_BEYOND = 1.5
 """Most that all places beyond one end of what is seen say against keys: a sleeve, a lamp or a title
 may hide as many keys as it likes."""
 _MIDDLE = 0.005
 """For each white key by which the middle of what is seen is off the middle of the keyboard."""
 _TURN = 49
 """In a mirror, edge n of the white keys is where edge 49 - n was, in some octave."""
-_SIZES = ((0, len(WHITES), 0.0), (9, 36, float(np.log(5))))
+_SIZES = ((0, len(WHITES), 0.0), (9, 36, float(np.log(22 / 2))))
 """First white key and number of white keys of a whole keyboard and of 61 keys, C2 to C7, and how
-much rarer that is."""
+much rarer that is: 2 of the 22 films that we looked at show one."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,10 @@ def namings(evidence: KeyEvidence) -> list[Naming]:
                     inside = min(inner, outer) >= 0 and max(inner, outer) < len(odds)
                     if inside and odds[inner] > 1 and odds[outer] < 0:
                         score += _END
+                if 0 <= ends[0] < len(odds):
+                    score += evidence.bare[ends[0], 0]
+                if 0 < ends[1] <= len(odds):
+                    score += evidence.bare[ends[1] - 1, 1]
                 named = shift + (_TURN - middle if mirrored else middle)
                 score -= _MIDDLE * abs(named - len(WHITES) / 2)
                 way = (shift, mirrored)

@@ -173,7 +173,7 @@ def _find_edges(
 def _lit(profile: NDArray[np.float64]) -> NDArray[np.float64]:
     """(P,) Part of the contrast that brightness profiles (P, S) have in full light."""
     brightest = np.nan_to_num(profile).max(axis=1)
-    return np.clip(brightest / _LIT, _DARKEST, 1.0)
+    return np.asarray(np.clip(brightest / _LIT, _DARKEST, 1.0))
 
 
 def _dip(
