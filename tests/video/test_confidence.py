@@ -17,7 +17,7 @@ from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.keyboard_look import KeyboardLook, look_at_keyboard
 from pianomime.video.notes.fingers import find_note_fingers
-from pianomime.video.remarks import Remark, on_agreement, on_keyboard
+from pianomime.video.remarks import Remark, on_agreement, on_keyboard, on_lost_hands
 from pianomime.video.repairs import list_repairs
 from pianomime.video.verdict import judge
 
@@ -59,12 +59,13 @@ def usual(frames):
     return KeyboardLook(0.9, np.ones(frames, np.float32))
 
 
-def confidence(tracks, score, look=None, certainty=1.0) -> Confidence:
+def confidence(tracks, score, look=None, certainty=1.0, missing=None) -> Confidence:
     tips = raised(tracks.points, score.frames())
     fingers = find_note_fingers(score, tips, tracks.seen)
     points = tips[: len(tracks), ..., :2]
     look = look or usual(len(tracks))
-    return estimate_confidence(tracks, score, fingers, points, look, certainty)
+    missing = np.zeros(len(tracks), bool) if missing is None else missing
+    return estimate_confidence(tracks, score, fingers, points, look, missing, certainty)
 
 
 def later(score, seconds):
@@ -91,6 +92,30 @@ def test_hands_that_are_lost(score, points, gone):
     assert frames[GONE][10:-10].max() < 0.5
     assert frames[: GONE.start - 40].min() > 0.8
     assert frames[GONE.stop + 40 :].min() > 0.8
+
+
+def test_titles_are_no_doubt(score, points):
+    """What shows no keyboard is counted apart, and does not lower what is shown about it."""
+    missing = np.zeros(len(points), bool)
+    missing[GONE] = True
+    found = np.repeat(~missing[:, None], 2, axis=1)
+    still = points.copy()
+    still[GONE] = points[GONE.start]
+    made = confidence(seen(still, found), score, missing=missing)
+    assert made.frames[GONE].max() == 0
+    assert not made.in_doubt.any()
+    assert made.mean > 0.9 > made.frames.mean()
+    verdict = judge(made, [])
+    assert verdict.grade == "usable"  # the fingers of notes in it are guesses
+    assert "in doubt" not in verdict.line
+    assert "3.0 s more show no keyboard" in verdict.line
+    assert on_lost_hands(seen(still, found), missing) == []
+    silent = ~((score.onset >= GONE.start / 20) & (score.onset < GONE.stop / 20))
+    rest = replace(
+        score,
+        **{name: getattr(score, name)[silent] for name in ("key", "onset", "offset", "velocity")},
+    )
+    assert judge(confidence(seen(still, found), rest, missing=missing), []).grade == "good"
 
 
 def test_a_single_frame_is_interpolated_well(score, points):

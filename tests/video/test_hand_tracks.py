@@ -76,7 +76,10 @@ def test_a_hand_that_is_lost_for_long_is_reported(truth):
     for frame in range(100, 140):
         sightings[frame] = sightings[frame][:1]
     tracks = follow(sightings, SIZE, still())
-    assert poorly_seen(tracks) == [(5.0, 7.0, RIGHT)]
+    missing = np.zeros(len(tracks), bool)
+    assert poorly_seen(tracks, missing) == [(5.0, 7.0, RIGHT)]
+    missing[90:120] = True
+    assert poorly_seen(tracks, missing) == [(6.0, 7.0, RIGHT)]
 
 
 def test_ghosts_are_left_out(truth):

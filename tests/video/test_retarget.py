@@ -30,6 +30,7 @@ from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands import detector
 from pianomime.video.keyboard.points import place_of
 from pianomime.video.keyboard_look import look_at_keyboard
+from pianomime.video.moments import good_moment, worst_moments
 from pianomime.video.overlay import write_overlay
 from pianomime.video.remarks import on_keyboard
 from pianomime.video.retarget import RetargetConfig, retarget
@@ -531,6 +532,10 @@ def test_a_camera_that_moves(light_up, hands, monkeypatch, tmp_path, score, plan
     assert any("no keyboard is seen from 1.0 s to 1.6 s" in told.text for told in made.remarks), (
         made.remarks
     )
+    assert "s more show no keyboard" in made.verdict.line
+    assert made.demonstration.quality["seconds_with_keyboard"] == pytest.approx(4.4, abs=0.1)
+    moments = [*worst_moments(made), good_moment(made)]
+    assert not made.confidence.missing[[moment.frame for moment in moments]].any()
     heard = score.clip(0.0, 5.0)
     seen = (heard.onset < 1.0) | (heard.onset > 1.6)
     if light_up:

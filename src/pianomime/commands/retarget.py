@@ -118,7 +118,10 @@ class Retarget:
             f"{quality['notes_touched']:.0%} have a finger on their key (shifted to other keys or "
             f"times, {quality['notes_touched_by_chance']:.0%} would)"
         )
-        print(f"in doubt: {quality['seconds_in_doubt']:.1f} s of {quality['seconds']:.1f} s")
+        print(
+            f"in doubt: {quality['seconds_in_doubt']:.1f} s of "
+            f"{quality['seconds_with_keyboard']:.1f} s"
+        )
         for remark in made.remarks[:_REMARKS]:
             print(f"note: {shown(remark.text)}")
             if remark.action:

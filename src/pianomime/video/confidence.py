@@ -47,6 +47,8 @@ class Confidence:
         keyboard: (T,) whether the keys are where they should be, 0..1.
         notes: (T,) agreement beyond chance of the notes about the frame with the fingers, 0..1.
         in_video: (2,) bool, hands that are in the video.
+        missing: (T,) bool, frames that show no keyboard, such as a title: there confidence is 0,
+            and they count neither as good nor as doubtful.
         supported: (N,) bool, notes with a finger on their key at the onset that is also theirs.
         agreement: of all notes with the fingers.
         better: a shift of all notes with which they agree clearly better; None if there is none.
@@ -56,6 +58,7 @@ class Confidence:
     keyboard: NDArray[np.float32]
     notes: NDArray[np.float32]
     in_video: NDArray[np.bool_]
+    missing: NDArray[np.bool_]
     supported: NDArray[np.bool_]
     agreement: Agreement
     better: Shift | None
@@ -69,8 +72,19 @@ class Confidence:
         seen = hands.mean(axis=1) if hands.shape[1] else np.zeros(len(hands), np.float32)
         return np.asarray(seen * self.keyboard * self.notes)
 
+    @property
+    def in_doubt(self) -> NDArray[np.bool_]:
+        """(T,) bool, frames with a keyboard in which it is less than `DOUBT`."""
+        return np.asarray((self.frames < DOUBT) & ~self.missing)
+
+    @property
+    def mean(self) -> float:
+        """Mean confidence of the frames with a keyboard; 0 if there are none."""
+        shown = self.frames[~self.missing]
+        return float(shown.mean()) if len(shown) else 0.0
+
     def by_second(self) -> NDArray[np.float32]:
-        """(ceil(T / 20),) Mean confidence of every second."""
+        """(ceil(T / 20),) Mean confidence of every second, 0 where no keyboard is shown."""
         frames = self.frames
         first = np.arange(0, len(frames), round(FRAME_RATE))
         count = np.diff(np.append(first, len(frames)))
@@ -83,6 +97,7 @@ def estimate_confidence(
     fingers: NoteFingers,
     points: NDArray[np.floating],
     look: KeyboardLook,
+    missing: NDArray[np.bool_],
     notes_certainty: float = 1.0,
 ) -> Confidence:
     """Estimate how far a demonstration can be trusted in each frame.
@@ -94,6 +109,7 @@ def estimate_confidence(
         points: (F, 2, 6, 2) the points of the tracks without parallax, in the frames up to the end
             of the notes or of the video, whichever comes first.
         look: of the keyboard in the video.
+        missing: (T,) bool, frames that show no keyboard.
         notes_certainty: how sure the notes are for another reason than the fingers, 0..1: that keys
             light up, where they were read from keys.
     """
@@ -104,8 +120,8 @@ def estimate_confidence(
     agreed = agreement(score, np.where(reliable, points, far)[:, tracks.seen])
     raw = np.where(reliable, tracks.points[: len(points)], far)[:, tracks.seen]
     supported = agreed.touched & ~fingers.guessed
-    notes = _notes(score, supported, agreed, len(tracks)) * notes_certainty
-    keyboard = _ramp(look.usual, _HIDDEN, _USUAL)
+    notes = _notes(score, supported, agreed, missing) * notes_certainty
+    keyboard = _ramp(look.usual, _HIDDEN, _USUAL) * ~missing
     if look.pattern is not None:
         keyboard = keyboard * _ramp(np.float64(look.pattern), _NO_KEYBOARD, _KEYBOARD)
     return Confidence(
@@ -113,6 +129,7 @@ def estimate_confidence(
         np.asarray(keyboard, np.float32),
         np.asarray(notes, np.float32),
         tracks.seen,
+        missing,
         supported,
         agreed,
         better_shift(score, raw),
@@ -131,10 +148,14 @@ def _hands(tracks: HandTracks) -> NDArray[np.float32]:
 
 
 def _notes(
-    score: Score, supported: NDArray[np.bool_], agreed: Agreement, frames: int
+    score: Score, supported: NDArray[np.bool_], agreed: Agreement, missing: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """(T,) Agreement beyond chance of the notes about each frame."""
+    frames = len(missing)
     frame = np.minimum(score.note_frames()[:, 0], frames - 1)
+    # Notes during a title say nothing about those before and after it.
+    shown = ~missing[frame]
+    frame, supported = frame[shown], supported[shown]
     sigma = _WINDOW * FRAME_RATE
     # The filter's weights have the sum 1; here a note in the frame itself weighs 1.
     scale = np.sqrt(2 * np.pi) * sigma

@@ -22,6 +22,8 @@ _ABOUT = 1.0
 """[s] Notes up to so far from a frame are named as the reason for its confidence."""
 _NAMED = 4
 """Most notes that are named."""
+_BEST = 0.75
+"""Quantile of the confidence from which a moment is a good one."""
 _FULL = 0.9
 """Confidence, and parts of it, from which nothing is poor."""
 
@@ -48,8 +50,8 @@ def worst_moments(made: Retargeted) -> list[Moment]:
         made: the retargeted video.
     """
     busy = _pressed(made)
-    # Of frames alike, those in which something is played show more.
-    rank = made.confidence.frames - 1e-3 * busy
+    # Of frames alike, those in which something is played show more; a title shows nothing.
+    rank = np.where(made.confidence.missing, np.inf, made.confidence.frames - 1e-3 * busy)
     apart = round(max(_APART * FRAME_RATE, _SHARE_APART * len(rank)))
     chosen: list[int] = []
     for _ in range(_WORST):
@@ -71,10 +73,10 @@ def good_moment(made: Retargeted) -> Moment | None:
     Args:
         made: the retargeted video.
     """
-    frames = made.confidence.frames
+    frames, shown = made.confidence.frames, ~made.confidence.missing
     if frames.max() < DOUBT:
         return None
-    good = np.flatnonzero(frames >= np.quantile(frames, 0.75))
+    good = np.flatnonzero(shown & (frames >= np.quantile(frames[shown], _BEST)))
     number = int(good[_pressed(made)[good].argmax()])
     return moment(made, number)
 
@@ -106,7 +108,9 @@ def _telling(made: Retargeted, number: int) -> int:
     if confidence.notes[number] > others or not len(unsupported):
         return number
     onset = made.demonstration.score.note_frames()[unsupported, 0]
-    return int(min(onset[np.abs(onset - number).argmin()], len(confidence.keyboard) - 1))
+    onset = np.minimum(onset, len(confidence.missing) - 1)
+    onset = onset[~confidence.missing[onset]]
+    return int(onset[np.abs(onset - number).argmin()]) if len(onset) else number
 
 
 def _unsupported(made: Retargeted, number: int) -> NDArray[np.int64]:

@@ -219,8 +219,13 @@ def on_missing_hands(tracks: HandTracks) -> list[Remark]:
     ]
 
 
-def on_lost_hands(tracks: HandTracks) -> list[Remark]:
-    """Remarks on intervals in which a hand was not seen."""
+def on_lost_hands(tracks: HandTracks, missing: NDArray[np.bool_]) -> list[Remark]:
+    """Remarks on intervals in which a keyboard is seen, but a hand is not.
+
+    Args:
+        tracks: the tracked hands.
+        missing: (T,) bool, frames in which no keyboard is seen.
+    """
     return [
         Remark(
             f"the {'left' if hand == LEFT else 'right'} hand is not seen from {first:.1f} s to "
@@ -228,12 +233,16 @@ def on_lost_hands(tracks: HandTracks) -> list[Remark]:
             "leave these seconds out (--start and --seconds of `play` and `train-expert`), or take "
             "a film in which both hands are whole in the picture",
         )
-        for first, end, hand in poorly_seen(tracks)
+        for first, end, hand in poorly_seen(tracks, missing)
     ]
 
 
-def poorly_seen(tracks: HandTracks) -> list[tuple[float, float, int]]:
-    """Intervals of at least half a second in which a hand was not seen.
+def poorly_seen(tracks: HandTracks, missing: NDArray[np.bool_]) -> list[tuple[float, float, int]]:
+    """Intervals of at least half a second in which a keyboard is seen, but a hand is not.
+
+    Args:
+        tracks: the tracked hands.
+        missing: (T,) bool, frames in which no keyboard is seen.
 
     Returns:
         Beginning and end [s] and the hand of each, in order of time.
@@ -241,7 +250,7 @@ def poorly_seen(tracks: HandTracks) -> list[tuple[float, float, int]]:
     return sorted(
         (first, end, hand)
         for hand in (LEFT, RIGHT)
-        for first, end in intervals(~tracks.found[:, hand])
+        for first, end in intervals(~tracks.found[:, hand] & ~missing)
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pianomime.errors import InputError
 from pianomime.installation import install_command
@@ -24,7 +25,7 @@ from pianomime.transcription.recording import Recording
 from pianomime.transcription.transcribe import transcribe
 from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
-from pianomime.video.confidence import DOUBT, Confidence, estimate_confidence
+from pianomime.video.confidence import Confidence, estimate_confidence
 from pianomime.video.film.background import background, median_of
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
@@ -148,6 +149,7 @@ def retarget(
         fingers,
         fingertips[: len(seen.tracks), ..., :2].astype(np.float32),
         seen.look,
+        seen.missing,
         timed.certainty,
     )
     plan = align(timed.score, fingertips, fingers, config.align)
@@ -157,16 +159,16 @@ def retarget(
         *seen.remarks,
         *timed.remarks,
         *remark.on_fingering(confidence, plan),
-        *remark.on_lost_hands(seen.tracks),
+        *remark.on_lost_hands(seen.tracks, seen.missing),
     ]
     verdict = judge(confidence, remarks)
     repairs = list_repairs(seen.tracks, plan, confidence, timed.outside)
-    frames = confidence.frames
     quality: dict[str, Any] = {
         "verdict": verdict.grade,
-        "confidence": round(float(frames.mean()), 4),
-        "seconds": len(frames) / FRAME_RATE,
-        "seconds_in_doubt": int((frames < DOUBT).sum()) / FRAME_RATE,
+        "confidence": round(confidence.mean, 4),
+        "seconds": len(seen.tracks) / FRAME_RATE,
+        "seconds_with_keyboard": int((~seen.missing).sum()) / FRAME_RATE,
+        "seconds_in_doubt": int(confidence.in_doubt.sum()) / FRAME_RATE,
         "keyboard": seen.view.description,
         "black_and_white_agree": None if seen.look.pattern is None else round(seen.look.pattern, 4),
         "notes": len(timed.score),
@@ -305,12 +307,22 @@ class _Taken(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What one pass over the video showed, in the best view."""
+    """What one pass over the video showed, in the best view.
+
+    Attributes:
+        view: the best one.
+        tracks: the tracked hands.
+        timed: the notes.
+        look: of the keyboard.
+        missing: (T,) bool, frames in which no keyboard is seen.
+        remarks: on all of these but the notes.
+    """
 
     view: View
     tracks: HandTracks
     timed: _Timed
     look: KeyboardLook
+    missing: NDArray[np.bool_]
     remarks: list[Remark]
 
 
@@ -365,8 +377,7 @@ def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
         if len(tracks) == _MOST_FRAMES:
             text = f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out"
             remarks.append(Remark(text, "cut the video, and retarget its parts"))
-        look = replace(look, usual=np.where(missing, np.float32(0.0), look.usual))
-    return _Seen(view, tracks, taken.timed, look, remarks)
+    return _Seen(view, tracks, taken.timed, look, missing, remarks)
 
 
 def _detect(

@@ -86,6 +86,7 @@ _FACTS = {
     "parallax_millimetres": "parallax corrected, median [mm]",
     "align": "--align",
     "seconds": "seconds of video",
+    "seconds_with_keyboard": "seconds in which a keyboard is seen",
 }
 """What is shown of `Demonstration.quality` at the end, and what it is called."""
 
@@ -133,7 +134,8 @@ def _measured(made: Retargeted) -> str:
     return (
         f"{agreed.share:.0%} of {quality['notes']} notes have a finger on their key when they "
         f"begin; shifted to other keys or times, {agreed.chance:.0%} of them would. "
-        f"{quality['seconds_in_doubt']:.1f} s of {quality['seconds']:.1f} s are in doubt."
+        f"{quality['seconds_in_doubt']:.1f} s of {quality['seconds_with_keyboard']:.1f} s are in "
+        "doubt."
     )
 
 

@@ -59,10 +59,11 @@ def draw_timeline(made: Retargeted, theme: Theme) -> bytes:
 
 
 def _confidence(axes: Axes, made: Retargeted, theme: Theme) -> None:
-    frames = made.confidence.frames
+    # Where no keyboard is shown, there is a gap.
+    frames = np.where(made.confidence.missing, np.nan, made.confidence.frames)
     first = np.arange(0, len(frames), max(1, len(frames) // _MOST_POINTS))
     # The lowest of frames that share a column: no short doubt gets lost.
-    lowest = np.minimum.reduceat(frames, first)
+    lowest = np.fmin.reduceat(frames, first)
     seconds = first / FRAME_RATE
     axes.fill_between(seconds, lowest, color=theme.hands[LEFT], alpha=0.25, linewidth=0)
     axes.plot(seconds, lowest, color=theme.hands[LEFT], linewidth=1.4)
@@ -76,15 +77,17 @@ def _confidence(axes: Axes, made: Retargeted, theme: Theme) -> None:
 
 def _causes(axes: Axes, made: Retargeted, theme: Theme) -> None:
     tracks, confidence = made.tracks, made.confidence
+    shown = ~confidence.missing
     guessed = np.zeros(len(tracks), bool)
     onset = made.demonstration.score.note_frames()[~confidence.supported, 0]
     guessed[np.minimum(onset, len(tracks) - 1)] = True
     rows = [
-        ("left hand not seen", ~tracks.found[:, LEFT], theme.hands[LEFT]),
-        ("right hand not seen", ~tracks.found[:, RIGHT], theme.hands[RIGHT]),
+        ("left hand not seen", ~tracks.found[:, LEFT] & shown, theme.hands[LEFT]),
+        ("right hand not seen", ~tracks.found[:, RIGHT] & shown, theme.hands[RIGHT]),
         ("outliers replaced", np.any(tracks.mended, axis=(1, 2)), theme.faint_text),
         ("finger guessed", guessed, theme.wrong),
-        ("keyboard hidden, moved", confidence.keyboard < DOUBT, theme.wrong),
+        ("keyboard hidden, moved", (confidence.keyboard < DOUBT) & shown, theme.wrong),
+        ("no keyboard shown", ~shown, theme.faint_text),
     ]
     for row, (_, holds, colour) in enumerate(rows):
         axes.broken_barh(_spans(holds, len(tracks)), (row - 0.35, 0.7), color=colour, linewidth=0)

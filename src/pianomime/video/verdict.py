@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pianomime.keyboard import FRAME_RATE
-from pianomime.video.confidence import DOUBT, Confidence
+from pianomime.video.confidence import Confidence
 from pianomime.video.remarks import Remark
 
 _FEW_GUESSED = 0.02
 """Share of notes whose finger may be a guess in a good demonstration."""
 _SHORT_DOUBT = 0.02
-"""Share of the frames that may be in doubt in a good demonstration."""
+"""Share of the frames with a keyboard that may be in doubt in a good demonstration."""
 _MUCH_DOUBT = 0.5
-"""Share of the frames in doubt from which the whole demonstration is."""
+"""Share of the frames with a keyboard in doubt from which the whole demonstration is."""
 
 
 @dataclass(frozen=True)
@@ -38,23 +38,32 @@ def judge(confidence: Confidence, remarks: Sequence[Remark]) -> Verdict:
         confidence: in it, frame by frame.
         remarks: on its making.
     """
-    frames = confidence.frames
-    doubt = frames < DOUBT
+    shown = ~confidence.missing
+    doubt = confidence.in_doubt[shown]
     guessed, notes = int((~confidence.supported).sum()), len(confidence.supported)
     wrong = [remark for remark in remarks if remark.weight == "wrong"]
     if wrong:
         first = wrong[0]
         return Verdict("doubtful", f"Doubtful: {first.text}. To do: {first.action}.")
-    seconds = f"{doubt.sum() / FRAME_RATE:.1f} s of {len(frames) / FRAME_RATE:.1f} s are in doubt"
+    seconds = f"{doubt.sum() / FRAME_RATE:.1f} s of {shown.sum() / FRAME_RATE:.1f} s are in doubt"
+    unseen = _unseen(confidence)
     if doubt.mean() >= _MUCH_DOUBT:
         return Verdict(
-            "doubtful", f"Doubtful: {seconds}. To do: see why at the worst moments on the page."
+            "doubtful",
+            f"Doubtful: {seconds}{unseen}. To do: see why at the worst moments on the page.",
         )
     check = [remark.text for remark in remarks if remark.weight == "check"]
     if guessed <= _FEW_GUESSED * notes and doubt.mean() <= _SHORT_DOUBT and not check:
-        return Verdict("good", "Good: use it as it is.")
+        return Verdict("good", f"Good: use it as it is{unseen}.")
     reasons = [f"the finger is guessed of {guessed} of {notes} notes"] if guessed else []
     reasons += [seconds] if doubt.any() else []
     if check:
-        return Verdict("usable", f"Usable, but check first: {'; '.join([check[0], *reasons])}.")
-    return Verdict("usable", f"Usable: {'; '.join(reasons)}.")
+        doubts = "; ".join([check[0], *reasons])
+        return Verdict("usable", f"Usable, but check first: {doubts}{unseen}.")
+    return Verdict("usable", f"Usable: {'; '.join(reasons)}{unseen}.")
+
+
+def _unseen(confidence: Confidence) -> str:
+    """What is added where some of the video shows no keyboard."""
+    missing = float(confidence.missing.sum() / FRAME_RATE)
+    return f"; {missing:.1f} s more show no keyboard" if missing else ""
