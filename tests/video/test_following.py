@@ -9,6 +9,7 @@ import made_up_video as made_up
 from pianomime.progress import no_progress
 from pianomime.video.film.background import median_of, sampled
 from pianomime.video.film.film import Film
+from pianomime.video.keyboard import views
 from pianomime.video.keyboard.following import follow_keyboard, stands_still
 from pianomime.video.keyboard.registration import Pyramid, Template
 from pianomime.video.keyboard.views import find_views
@@ -96,6 +97,17 @@ def test_after_a_cut_the_part_that_is_seen_is_named_like_the_whole(tmp_path):
     film = film_of(tmp_path / "film.mp4", moved)
     (view,) = find_views(film, MOST, None, None, no_progress)
     assert error(view.track, moved, range(80)) < 0.006
+
+
+@pytest.mark.parametrize("moved", [lambda _: np.eye(3), swaying], ids=["still", "moving"])
+def test_what_cannot_be_is_refused_before_a_film_is_followed(tmp_path, monkeypatch, moved):
+    def follow(*_):
+        pytest.fail("followed the keyboard")
+
+    monkeypatch.setattr(views, "follow_keyboard", follow)
+    monkeypatch.setattr(views, "_TRIED", 1)  # it takes seconds each
+    film = film_of(tmp_path / "film.mp4", moved, 1.5)
+    assert find_views(film, MOST, 9, None, no_progress) == []
 
 
 def test_without_a_keyboard_there_is_none(tmp_path):

@@ -334,7 +334,7 @@ def test_too_long_a_video_shows_before_the_work(video, hands, monkeypatch, untou
 
 
 def test_too_long_a_video_that_does_not_say_so(video, hands, monkeypatch):
-    monkeypatch.setattr(room, "_MOST_FRAMES", 60)
+    monkeypatch.setattr(room, "MOST_FRAMES", 60)
     made = retarget(video, RetargetConfig(hand_model=hands))
     assert len(made.tracks) == 60
     assert any("left out" in remark.text for remark in made.remarks)
@@ -387,6 +387,15 @@ def test_keys_that_are_marked_wrongly(video, hands, tmp_path, plane, octaves, ke
     else:
         assert grade == ("usable" if octaves else "good")
     assert contradicted == bool(octaves or keys)
+
+
+@pytest.mark.parametrize("octave", [1, 2])
+def test_an_octave_that_is_told(video, hands, monkeypatch, octave):
+    """What the picture says of it is known since the keyboard was found."""
+    monkeypatch.setattr(room, "find_keyboards", lambda _: pytest.fail("searched again"))
+    made = retarget(video, RetargetConfig(hand_model=hands, octave=octave, mirrored=False))
+    contradicted = any("contradicts the names" in remark.text for remark in made.remarks)
+    assert contradicted == (octave != 1)
 
 
 def test_a_longer_song_is_cut(video, hands, tmp_path, score, plan, plane):

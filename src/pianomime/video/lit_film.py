@@ -17,7 +17,7 @@ from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import nobody
 from pianomime.video.keyboard.points import NamedPoints
-from pianomime.video.keyboard.views import find_views, view_of_points
+from pianomime.video.keyboard.views import MOST_FRAMES, find_views, view_of_points
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.reading import read_notes
 
@@ -48,11 +48,10 @@ def notes_of_lit_film(
         InputError: it is no video, shows no keyboard, is too long, or its keys do not light up.
     """
     film = Film(video)
-    most = int(MAX_SECONDS * FRAME_RATE) - 1
     if film.seconds > MAX_SECONDS:
         raise InputError(f"{film.path}: is longer than {MAX_SECONDS / 3600:.0f} hours; cut it")
     if points is None:
-        views = find_views(film, most, octave, mirrored, progress)
+        views = find_views(film, MOST_FRAMES, octave, mirrored, progress)
         if not views:
             raise InputError(remark.no_keyboard(film.path, remark.told_names(octave, mirrored)))
         view = views[0]
@@ -61,7 +60,7 @@ def notes_of_lit_film(
     reader = KeyLight(view.track, film.working_size)
     total = round(film.seconds * FRAME_RATE)
     with LightRecord(len(ZONES)) as light:
-        for number, frame in enumerate(islice(film.frames(FRAME_RATE), most)):
+        for number, frame in enumerate(islice(film.frames(FRAME_RATE), MOST_FRAMES)):
             light.append(reader.read(number, frame.picture))
             progress("keys", number + 1, max(total, number + 1))
         progress("notes", 0, 0)

@@ -150,15 +150,22 @@ def _lowest(keyboard: Keyboard) -> str:
 
 
 def on_stretches(view: View) -> list[Remark]:
-    """Remarks on stretches of a film whose octave is not sure."""
+    """Remarks on stretches of a film whose names of keys are not sure, or contradict the others."""
+    guessed = [
+        (
+            frame,
+            f"the camera shows a part of the keyboard whose octave is a guess: {_lowest(keyboard)}",
+        )
+        for frame, keyboard in view.guessed
+    ]
+    turned = [(frame, "the keyboard is mirrored unlike elsewhere") for frame in view.turned]
     return [
         Remark(
-            f"from {frame / FRAME_RATE:.1f} s on the camera shows a part of the keyboard whose "
-            f"octave is a guess: {_lowest(keyboard)}",
+            f"from {frame / FRAME_RATE:.1f} s on {what}",
             "look at the overlay from there; if it is wrong, cut the video there",
             "check",
         )
-        for frame, keyboard in view.guessed
+        for frame, what in sorted(guessed + turned)
     ]
 
 

@@ -26,7 +26,7 @@ from pianomime.transcription.transcribe import transcribe
 from pianomime.video import remarks as remark
 from pianomime.video.align import Rule, align, raised
 from pianomime.video.confidence import Confidence, estimate_confidence
-from pianomime.video.film.background import background, median_of
+from pianomime.video.film.background import background
 from pianomime.video.film.film import Film
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.detector import HandDetector, check_mediapipe
@@ -36,7 +36,7 @@ from pianomime.video.hands.tracks import HandTracks, follow
 from pianomime.video.keyboard.keyboard import find_keyboards
 from pianomime.video.keyboard.points import NamedPoints, read_points
 from pianomime.video.keyboard.track import KeyboardTrack
-from pianomime.video.keyboard.views import View, find_views, view_of_points
+from pianomime.video.keyboard.views import MOST_FRAMES, View, find_views, view_of_points
 from pianomime.video.keyboard_look import KeyboardLook, look_at_keyboard
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
 from pianomime.video.notes.fusion import Fused, fuse
@@ -49,8 +49,6 @@ from pianomime.video.remarks import Remark
 from pianomime.video.repairs import Repair, list_repairs
 from pianomime.video.verdict import Verdict, judge
 
-_MOST_FRAMES = int(MAX_SECONDS * FRAME_RATE) - 1
-"""Frames of the longest score; a video may be longer than its header says."""
 _TOO_FEW_TOUCHED = 0.5
 """Share of a MIDI file's notes with a finger on their key below which it is of another song."""
 _BETTER = 0.02
@@ -331,7 +329,7 @@ def _find_views(given: _Given, progress: Progress) -> list[View]:
     if given.points is not None:
         return [view_of_points(given.points, given.film)]
     config = given.config
-    views = find_views(given.film, _MOST_FRAMES, config.octave, config.mirrored, progress)
+    views = find_views(given.film, MOST_FRAMES, config.octave, config.mirrored, progress)
     if not views:
         raise InputError(remark.no_keyboard(given.film.path, _told(config)))
     # Only notes can decide what is open; without them the likeliest is assumed.
@@ -342,14 +340,11 @@ def _told(config: RetargetConfig) -> list[str]:
     return remark.told_names(config.octave, config.mirrored)
 
 
-def _on_told_names(given: _Given, track: KeyboardTrack) -> list[Remark]:
+def _on_told_names(given: _Given, view: View) -> list[Remark]:
     """Remarks on names of the keys that a user told, where the picture contradicts them."""
-    if given.points is None and not _told(given.config):
-        return []
-    if track.backgrounds:
-        picture, plane = track.backgrounds[0]
-        return remark.on_told_names(plane, find_keyboards(median_of([picture])))
-    return remark.on_told_names(track.usual, find_keyboards(background(given.film)))
+    if given.points is not None:
+        return remark.on_told_names(view.track.usual, find_keyboards(background(given.film)))
+    return remark.on_told_names(view.namings[0].plane, view.untold)
 
 
 def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
@@ -368,13 +363,13 @@ def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
         look = look_at_keyboard(light)
         remarks = [
             *taken.guessed,
-            *_on_told_names(given, view.track),
+            *_on_told_names(given, view),
             *remark.on_stretches(view),
             *remark.on_unseen_keyboard(missing),
             *remark.on_missing_hands(tracks),
             *remark.on_keyboard(look),
         ]
-        if len(tracks) == _MOST_FRAMES:
+        if len(tracks) == MOST_FRAMES:
             text = f"what comes after {MAX_SECONDS / 3600:.0f} hours is left out"
             remarks.append(Remark(text, "cut the video, and retarget its parts"))
     return _Seen(view, tracks, taken.timed, look, missing, remarks)
@@ -389,7 +384,7 @@ def _detect(
     sightings = Sightings()
     total = round(film.seconds * FRAME_RATE)
     with HandDetector(given.hand_model) as detector:
-        for number, frame in enumerate(islice(film.frames(FRAME_RATE), _MOST_FRAMES)):
+        for number, frame in enumerate(islice(film.frames(FRAME_RATE), MOST_FRAMES)):
             sightings.append(detector.detect(frame.picture, round(number * 1000 / FRAME_RATE)))
             for reader, light in zip(readers, lights, strict=True):
                 light.append(reader.read(number, frame.picture))
