@@ -9,6 +9,8 @@ from PIL import Image
 import made_up_video as made_up
 from pianomime.cli import main
 from pianomime.keyboard import BLACK
+from pianomime.video.film.film import Film
+from pianomime.video.keyboard.clear_picture import clear_picture
 from pianomime.video.keyboard.geometry import BLACK_FRONT, FRONT
 from pianomime.world.parameters import key_centres
 
@@ -41,6 +43,7 @@ def test_writes_where_the_keys_are(tmp_path, capsys):
     assert off.max() < 6
     assert Image.open(drawn).size == (1280, 720)
     lines = capsys.readouterr().out.splitlines()
+    assert found["second"] is None
     assert lines[0].startswith("keys A")
     assert "doubt" not in lines[0]
 
@@ -58,6 +61,66 @@ def test_says_what_is_open_and_is_told(path, tmp_path, capsys):
     assert found["sure"]
     # Not a whole octave below C2, which is key 15.
     assert 4 <= found["lowest"] <= 15
+
+
+def test_what_is_told_against_the_picture_is_not_sure(tmp_path, capsys):
+    whole, out = tmp_path / "whole.png", tmp_path / "k.json"
+    Image.fromarray(made_up.picture(made_up.camera(SIZE), SIZE)).save(whole)
+    main(["keyboard", str(whole), "--octave", "2", "-o", str(out)])
+    line = capsys.readouterr().out.splitlines()[0]
+    assert "contradicts the names" in line
+    found = json.loads(out.read_text("utf-8"))
+    assert (found["found"], found["sure"]) == (True, False)
+    main(["keyboard", str(whole), "--octave", "1", "--not-mirrored", "-o", str(out)])
+    assert "doubt" not in capsys.readouterr().out
+    assert json.loads(out.read_text("utf-8"))["sure"]
+
+
+def swaying(at):
+    return made_up.turn(2 * np.sin(2 * at), 15 * np.sin(3 * at), SIZE)
+
+
+@pytest.fixture(scope="module")
+def moving(tmp_path_factory):
+    """A film whose camera moves, after half a second of something else."""
+    path = tmp_path_factory.mktemp("moving") / "moving.mp4"
+    score = made_up.song(2.5)
+    made_up.write(
+        path,
+        made_up.camera(SIZE),
+        SIZE,
+        score,
+        made_up.plan_of(score),
+        made_up.times(2.5, 20),
+        False,
+        lambda at: None if at < 0.5 else swaying(at),
+    )
+    return path
+
+
+def test_a_film_whose_camera_moves(moving, tmp_path, capsys):
+    out, drawn = tmp_path / "k.json", tmp_path / "drawn.png"
+    main(["keyboard", str(moving), "-o", str(out), "--picture", str(drawn)])
+    found = json.loads(out.read_text("utf-8"))
+    assert (found["found"], found["sure"]) == (True, True)
+    assert found["second"] == pytest.approx(0.5, abs=0.1)
+    assert Image.open(drawn).size == SIZE
+    line = capsys.readouterr().out.splitlines()[0]
+    assert "followed through moving pictures" in line
+    assert f"at {found['second']:.2f} s" in line
+    plane = made_up.after(made_up.camera(SIZE), swaying(found["second"]))
+    keys = np.array([int(key) for key in found["keys"]])
+    world = np.stack((np.full(len(keys), (BLACK_FRONT + FRONT) / 2), key_centres()[keys, 1]), 1)
+    off = np.linalg.norm(list(found["keys"].values()) - plane.to_pixels(world), axis=1)
+    assert off.max() < 2
+
+
+def test_a_picture_of_a_film_whose_camera_moves_is_marked(moving):
+    film = Film(moving)
+    picture, second = clear_picture(film)
+    assert second >= 0.5
+    shown = next(film.frames(20.0, round(20 * second))).picture
+    np.testing.assert_array_equal(picture, shown)
 
 
 def test_no_keyboard(tmp_path, capsys):

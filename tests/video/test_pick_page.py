@@ -29,6 +29,12 @@ def video(tmp_path_factory):
     return path
 
 
+def seen(video):
+    """The video, and a picture of it: it takes seconds to look for a clear one."""
+    film = Film(video)
+    return film, film.sample(1)[0]
+
+
 @pytest.fixture
 def out(tmp_path):
     return tmp_path / "points.json"
@@ -37,7 +43,7 @@ def out(tmp_path):
 @pytest.fixture
 def page(video, out, monkeypatch):
     monkeypatch.setattr(local_server, "_PATIENCE", 0.5)
-    with PickPage(Film(video), out) as page:
+    with PickPage(*seen(video), out) as page:
         yield page
 
 
@@ -146,7 +152,7 @@ def test_browsers_leave_out_the_usual_port(video, out, monkeypatch, name):
         port = free.getsockname()[1]
     # As if it were 80, which not everybody may use.
     monkeypatch.setattr(local_server, "_USUAL_PORT", port)
-    with PickPage(Film(video), out, port) as page:
+    with PickPage(*seen(video), out, port) as page:
         talk = Talk(page)
         headers = {"Host": name, "Origin": f"http://{name}"}
         assert talk.send(talk.request(body=good_points(), **headers))[0] == 200
@@ -275,7 +281,7 @@ def test_two_clients_at_once(page, out):
 
 def test_points_that_cannot_be_written_can_be_sent_again(video, tmp_path):
     out = tmp_path / "gone" / "points.json"
-    with PickPage(Film(video), out) as page:
+    with PickPage(*seen(video), out) as page:
         talk = Talk(page)
         code, why = talk.send(talk.request(body=good_points()))
         assert code == 500
@@ -292,7 +298,7 @@ def test_no_other_machine_is_served(page):
 
 
 def test_every_page_has_its_own_secret(video, out):
-    with PickPage(Film(video), out) as one, PickPage(Film(video), out) as other:
+    with PickPage(*seen(video), out) as one, PickPage(*seen(video), out) as other:
         assert urlsplit(one.url).path != urlsplit(other.url).path
         with pytest.raises(urllib.error.HTTPError):
             urllib.request.urlopen(other.url.replace(other.url[-10:], one.url[-10:]))

@@ -14,7 +14,8 @@ class FindKeyboard:
     """Find the keyboard in a picture or a video from above, and name its keys.
 
     That is what `pianomime retarget` begins with. One line says what was found, and what the
-    picture leaves open.
+    picture leaves open. Where the camera of a video moves, or it is cut, that takes about as long
+    as the video; the line names the second at which keys are where the files say.
 
     Examples:
       pianomime keyboard PICTURE.jpg --picture SEEN.png
@@ -50,16 +51,16 @@ class FindKeyboard:
 
         from pianomime.commands.extras import extra
         from pianomime.commands.mirrored import mirrored_or_not
+        from pianomime.commands.progress import bars
         from pianomime.errors import InputError
         from pianomime.files import atomic
         from pianomime.shown import shown
 
         with extra("video"):
             from pianomime.video.drawing import draw_keys
-            from pianomime.video.film.still import read_still
             from pianomime.video.keyboard.findings import findings
-            from pianomime.video.keyboard.keyboard import find_keyboards
-            from pianomime.video.remarks import on_naming
+            from pianomime.video.keyboard.search import search_keyboard
+            from pianomime.video.remarks import on_naming, on_stretches, on_told_names
 
         mirrored = mirrored_or_not(self.mirrored, self.not_mirrored)
         for file, ending in ((self.out, ".json"), (self.picture, ".png")):
@@ -69,22 +70,34 @@ class FindKeyboard:
                 raise InputError(f"{file}: its name must end in {ending}")
             if file.resolve() == self.source.resolve():
                 raise InputError(f"{file}: would be overwritten; give it another name")
-        still = read_still(self.source)
-        keyboards = find_keyboards(still.brightness, self.octave, mirrored)
-        height, width = still.brightness.shape
-        if not keyboards:
-            print("no keyboard found" if self.octave is None else "no such keyboard found")
+        with bars() as progress:
+            searched = search_keyboard(self.source, self.octave, mirrored, progress)
+        keyboards = () if searched.view is None else searched.view.namings
+        doubtful = False
+        if searched.view is None:
+            told = (self.octave, mirrored) != (None, None)
+            print("no such keyboard found" if told else "no keyboard found")
         else:
-            doubts = "; in doubt: ".join(["", *map(str, on_naming(keyboards))])
-            print(f"{keyboards[0].describe()}{doubts}")
+            open_names = on_naming(keyboards)
+            contradicted = on_told_names(keyboards[0].plane, searched.view.untold)
+            doubtful = bool(open_names or contradicted)
+            moving = "" if searched.second is None else f"; at {searched.second:.2f} s"
+            doubts = [*open_names, *contradicted, *on_stretches(searched.view)]
+            said = "; in doubt: ".join(["", *map(str, doubts)])
+            print(f"{searched.view.description}{moving}, {keyboards[0].describe_fit()}{said}")
         if self.out is not None:
             self.out.parent.mkdir(parents=True, exist_ok=True)
-            found = findings(keyboards, (width, height), still.zoom)
+            height, width = searched.picture.shape[:2]
+            found = findings(
+                keyboards, (width, height), searched.zoom, not doubtful, searched.second
+            )
             with atomic(self.out) as temporary:
                 temporary.write_text(json.dumps(found) + "\n", "utf-8")
             print(f"written: {shown(self.out)}")
         if self.picture is not None:
-            drawn = draw_keys(still.picture, keyboards[0].plane) if keyboards else still.picture
+            drawn = searched.picture
+            if keyboards:
+                drawn = draw_keys(drawn, keyboards[0].plane)
             self.picture.parent.mkdir(parents=True, exist_ok=True)
             with atomic(self.picture) as temporary:
                 Image.fromarray(drawn).save(temporary)

@@ -46,14 +46,23 @@ class Pick:
         from pianomime.video.film.film import Film
 
         with extra("video"):
+            from pianomime.video.keyboard.clear_picture import clear_picture
             from pianomime.video.keyboard.pick_page import PickPage
 
         out = self.out or Path("out", file_name(self.video.stem) + "-points.json")
         if out.suffix != ".json":
             raise InputError(f"{out}: the name of a file of points must end in .json")
-        with PickPage(Film(self.video), out, self.port) as page:
+        film = Film(self.video)
+        picture, second = clear_picture(film)
+        with PickPage(film, picture, out, self.port) as page:
             out.parent.mkdir(parents=True, exist_ok=True)
             print(f"click the points on {page.url} (Ctrl-C to cancel)", flush=True)
+            if second is not None:
+                print(
+                    f"note: the camera moves, or the video is cut: the page shows the picture at "
+                    f"{second:.2f} s, and the points hold for that place alone; `pianomime "
+                    "retarget` follows the keyboard where --points is not given"
+                )
             if self.browser:
                 page.open_browser()
             saved = page.wait()

@@ -60,10 +60,11 @@ class Keyboard:
 
     def describe(self) -> str:
         """One line for the user: which keys were found, and how well their edges fit."""
-        return (
-            f"{self.describe_keys()}, edges within {self.error_metres * 1000:.1f} mm "
-            f"({self.error_pixels:.1f} pixels)"
-        )
+        return f"{self.describe_keys()}, {self.describe_fit()}"
+
+    def describe_fit(self) -> str:
+        """How well the edges that were found fit those of the world's keys."""
+        return f"edges within {self.error_metres * 1000:.1f} mm ({self.error_pixels:.1f} pixels)"
 
     def describe_keys(self) -> str:
         """Which keys were found; their edges would fit a wrong naming as well."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from string import Template
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from pianomime.closing import Closing
@@ -22,9 +23,6 @@ from pianomime.local_server import Content, LocalHandler, LocalServer
 from pianomime.video.film.film import Film
 from pianomime.video.keyboard.points import SUGGESTED, parse_points
 from pianomime.web_page import web_page
-
-_FRAMES = 15
-"""Pictures whose median the page shows."""
 
 _STYLE = """\
 #frame { position: relative; cursor: crosshair; }
@@ -86,22 +84,18 @@ class PickPage(Closing):
         url: address of the page, which holds a secret.
     """
 
-    def __init__(self, film: Film, out: Path, port: int = 0) -> None:
+    def __init__(self, film: Film, picture: NDArray[np.uint8], out: Path, port: int = 0) -> None:
         """Begin to serve.
 
         Args:
             film: the video.
+            picture: (height, width, 3) uint8, what the page shows of it, see `clear_picture`.
             out: JSON file to write, see `pianomime.video.keyboard.points`.
             port: port of the server; 0 for any free one.
 
         Raises:
-            InputError: there is no such port, it is in use, or no picture in the video can be read.
+            InputError: there is no such port, or it is in use.
         """
-        pictures = film.sample(_FRAMES)
-        if not pictures:
-            raise InputError(f"{film.path}: no picture in it can be read")
-        # The median removes most of the hands.
-        picture = np.median(np.stack(pictures), axis=0).astype(np.uint8)
         file = io.BytesIO()
         Image.fromarray(picture).save(file, "png")
         body = _BODY.substitute(
