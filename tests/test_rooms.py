@@ -55,7 +55,7 @@ VIDEO = (
     ("keyboard",),
     ("hands",),
     ("notes",),
-    ("align", "parallax", "drawing", "keyboard_look"),
+    ("align", "parallax", "drawing", "keyboard_look", "advice"),
     ("confidence",),
     ("remarks", "repairs"),
     ("verdict",),

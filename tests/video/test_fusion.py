@@ -9,6 +9,7 @@ import pytest
 
 import made_up_video as made_up
 from pianomime.music import Score
+from pianomime.video.advice import RETARGET
 from pianomime.video.notes.fusion import fuse
 from pianomime.video.notes.offset import LATEST_SOUND
 from pianomime.video.remarks import on_fused
@@ -74,7 +75,7 @@ def test_light_says_which_keys(played: Score) -> None:
     assert fused.both == len(kept)
     assert fused.only_seen == len(unheard)
     assert fused.only_heard == len(ghosts)
-    (line,) = on_fused(fused)
+    (line,) = on_fused(fused, RETARGET)
     assert line.text.startswith(f"{len(kept)} of {len(played)} notes are seen and heard; ")
     assert f"{len(unheard)} only seen are kept, {len(ghosts)} only heard are left out" in line.text
 
@@ -83,7 +84,7 @@ def test_a_sound_of_something_else(played: Score) -> None:
     other = replace(played, key=played.key + 1)
     fused = fuse(seen_of(played), other)
     assert not fused.alike
-    assert "the sound is of no help" in on_fused(fused)[0].text
+    assert "the sound is of no help" in on_fused(fused, RETARGET)[0].text
 
 
 def test_nothing_in_common() -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,14 @@ import made_up_video as made_up
 from made_up_listener import Teller, tone
 from one_line import fails
 from pianomime.cli import main
+from pianomime.commands.keyboard import FindKeyboard
+from pianomime.commands.retarget import Retarget
+from pianomime.commands.transcribe import Transcribe
 from pianomime.errors import InputError
 from pianomime.music import Score, onset_f1
 from pianomime.transcription import listener as listening
-from pianomime.video.film.background import background
-from pianomime.video.film.film import Film
-from pianomime.video.keyboard.keyboard import find_keyboards
+from pianomime.video.advice import KEYBOARD, RETARGET, TRANSCRIBE, Advice
+from pianomime.video.keyboard.plane import Plane
 from pianomime.video.keyboard.points import place_of
 from pianomime.video.recording_notes import RecordingConfig, RecordingNotes, notes_of_recording
 
@@ -36,9 +39,15 @@ def score() -> Score:
     return replace(song, velocity=np.arange(len(song)) % 90 + 20, pedal=np.array([[1.0, 2.0]]))
 
 
-def write(path: Path, score: Score, lit: bool = True, sound: float | None = SECONDS) -> Path:
+def write(
+    path: Path,
+    score: Score,
+    lit: bool = True,
+    sound: float | None = SECONDS,
+    plane: Plane | None = None,
+) -> Path:
     """A film of a keyboard without hands, with so many seconds of a tone."""
-    plane = made_up.camera(SIZE)
+    plane = plane or made_up.camera(SIZE)
     with av.open(str(path), "w") as film:
         stream: Any = film.add_stream("libx264", rate=20)
         stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
@@ -189,6 +198,28 @@ def test_a_damaged_sound(score: Score, tmp_path: Path, known: RecordingConfig) -
     assert read.score.onset.max() < 2.7
 
 
+def test_the_sound_decides_an_open_octave(score: Score, tmp_path: Path) -> None:
+    """What is seen is taken for keys in the middle, and is an octave lower."""
+    film = write(tmp_path / "part.mp4", score, plane=made_up.camera(SIZE, span=(-0.55, 0.15)))
+    read = notes_of_recording(film, listener=Teller(score))
+    assert read.source == "light and sound"
+    assert right(read, score)
+    assert not any("octave" in remark for remark in read.score.remarks)
+    nobody = notes_of_recording(film, RecordingConfig(notes="light"))
+    assert not right(nobody, score)
+    assert "leaves the octave open" in nobody.score.remarks[0]
+
+
+@pytest.mark.parametrize(
+    ("advice", "command"),
+    [(RETARGET, Retarget), (TRANSCRIBE, Transcribe), (KEYBOARD, FindKeyboard)],
+)
+def test_advice_is_of_options_that_there_are(advice: Advice, command: type) -> None:
+    options = {f"--{each.name.replace('_', '-')}" for each in fields(command)}
+    said = [getattr(advice, each.name) for each in fields(advice)]
+    assert set(re.findall(r"--[a-z-]+", " ".join(said))) <= options
+
+
 @pytest.mark.usefixtures("deaf")
 def test_no_notes_at_all_are_one_line(
     unlit: Path,
@@ -233,26 +264,22 @@ def test_falling_notes_become_a_midi_file_and_are_played(
 
 
 def test_a_picture_in_a_picture(score: Score, tmp_path: Path) -> None:
-    """A film in the corner of another one: its notes are right, or it is refused."""
-    plane = made_up.camera((480, 270))
-    room = np.add.outer(np.linspace(40, 140, SIZE[1]), np.linspace(0, 60, SIZE[0]))
+    """A film in the corner of another one, large enough for keys to be told apart."""
+    size, inner = (1280, 720), (960, 540)
+    plane, first = made_up.camera(inner), score.clip(0.0, 2.5)
+    room = np.add.outer(np.linspace(40, 140, size[1]), np.linspace(0, 60, size[0]))
     around = np.repeat(room[..., None], 3, axis=2).astype(np.uint8)
     path = tmp_path / "corner.mp4"
     with av.open(str(path), "w") as film:
         stream: Any = film.add_stream("libx264", rate=20)
-        stream.width, stream.height, stream.pix_fmt = *SIZE, "yuv420p"
-        for number in range(round(20 * SECONDS)):
+        stream.width, stream.height, stream.pix_fmt = *size, "yuv420p"
+        for number in range(50):
             at = number / 20
-            keys = score.key[(score.onset <= at) & (at < score.offset)]
+            keys = first.key[(first.onset <= at) & (at < first.offset)]
             seen = around.copy()
-            seen[-290:-20, -500:-20] = made_up.picture(plane, (480, 270), keys)
+            seen[-580:-40, -1000:-40] = made_up.picture(plane, inner, keys)
             frame = av.VideoFrame.from_ndarray(seen, format="rgb24")
             frame.pts, frame.time_base = number, Fraction(1, 20)
             film.mux(stream.encode(frame))
         film.mux(stream.encode(None))
-    config = RecordingConfig(notes="light")
-    if find_keyboards(background(Film(path))):
-        assert right(notes_of_recording(path, config), score)
-    else:
-        with pytest.raises(InputError, match="no keyboard found"):
-            notes_of_recording(path, config)
+    assert right(notes_of_recording(path, RecordingConfig(notes="light")), first)

@@ -57,6 +57,7 @@ class FindKeyboard:
         from pianomime.shown import shown
 
         with extra("video"):
+            from pianomime.video.advice import KEYBOARD
             from pianomime.video.drawing import draw_keys
             from pianomime.video.keyboard.findings import findings
             from pianomime.video.keyboard.search import search_keyboard
@@ -78,11 +79,11 @@ class FindKeyboard:
             told = (self.octave, mirrored) != (None, None)
             print("no such keyboard found" if told else "no keyboard found")
         else:
-            open_names = on_naming(keyboards)
-            contradicted = on_told_names(keyboards[0].plane, searched.view.untold)
+            open_names = on_naming(keyboards, KEYBOARD)
+            contradicted = on_told_names(keyboards[0].plane, searched.view.untold, KEYBOARD)
             doubtful = bool(open_names or contradicted)
             moving = "" if searched.second is None else f"; at {searched.second:.2f} s"
-            doubts = [*open_names, *contradicted, *on_stretches(searched.view)]
+            doubts = [*open_names, *contradicted, *on_stretches(searched.view, KEYBOARD)]
             said = "; in doubt: ".join(["", *map(str, doubts)])
             print(f"{searched.view.description}{moving}, {keyboards[0].describe_fit()}{said}")
         if self.out is not None:

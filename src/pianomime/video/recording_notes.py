@@ -15,9 +15,11 @@ from pianomime.transcription.listener import Listener, check_listener
 from pianomime.transcription.recording import Recording
 from pianomime.transcription.transcribe import transcribe, transcribe_excerpt
 from pianomime.video import remarks as remark
-from pianomime.video.keyboard.points import read_points
-from pianomime.video.lit_film import notes_of_lit_film
-from pianomime.video.notes.fusion import fuse
+from pianomime.video.advice import TRANSCRIBE
+from pianomime.video.keyboard.points import NamedPoints, read_points
+from pianomime.video.lit_film import LitNotes, notes_of_lit_film, ways_of_lit_film
+from pianomime.video.notes.open_names import name_by_sound
+from pianomime.video.remarks import Remark
 
 Notes = Literal["auto", "sound", "light"]
 """What the notes are taken from, see `RecordingConfig.notes`."""
@@ -74,7 +76,9 @@ def notes_of_recording(
     with open_media(path, "sound or a video that can be read") as container:
         film = pictures_of(container) is not None
     if config.notes == "light":
-        return RecordingNotes(_seen(path, config, progress), "light")
+        points = _points(config)
+        seen = notes_of_lit_film(path, points, progress, config.octave, config.mirrored)
+        return RecordingNotes(seen, "light")
     if config.notes == "sound" or not film:
         return RecordingNotes(_heard(path, config, progress, listener, film), "sound")
     heard: Score | None = None
@@ -84,7 +88,8 @@ def notes_of_recording(
     except InputError as error:
         why = _reason(path, error)
     try:
-        seen = _seen(path, config, progress)
+        points = _points(config)
+        ways = ways_of_lit_film(path, points, progress, config.octave, config.mirrored)
     except InputError as error:
         if heard is None:
             raise InputError(
@@ -92,8 +97,8 @@ def notes_of_recording(
             ) from error
         return RecordingNotes(heard, "sound")
     if heard is None:
-        return _alone(seen, why)
-    return _both(seen, heard)
+        return _alone(ways[0], remark.on_unused_sound(why))
+    return _both(ways, heard)
 
 
 def _heard(
@@ -108,10 +113,8 @@ def _heard(
     return transcribe_excerpt(recording, config.start, config.seconds, listener, progress)
 
 
-def _seen(path: Path, config: RecordingConfig, progress: Progress) -> Score:
-    """The notes of keys that light up."""
-    points = None if config.points is None else read_points(config.points)
-    return notes_of_lit_film(path, points, progress, config.octave, config.mirrored)
+def _points(config: RecordingConfig) -> NamedPoints | None:
+    return None if config.points is None else read_points(config.points)
 
 
 def _reason(path: Path, error: InputError) -> str:
@@ -119,25 +122,29 @@ def _reason(path: Path, error: InputError) -> str:
     return str(error).removeprefix(f"{path}: ")
 
 
-def _alone(seen: Score, why: str) -> RecordingNotes:
+def _alone(seen: LitNotes, why: list[Remark]) -> RecordingNotes:
     """The notes of keys that light up, where the sound says nothing of them."""
-    remarks = (*seen.remarks, *map(str, remark.on_unused_sound(why)))
-    return RecordingNotes(replace(seen, remarks=remarks), "light")
+    remarks = (*seen.open_names, *seen.score.remarks, *map(str, why))
+    return RecordingNotes(replace(seen.score, remarks=remarks), "light")
 
 
-def _both(seen: Score, heard: Score) -> RecordingNotes:
-    """The notes of light and sound where they agree; else those that are less in doubt."""
-    fused = fuse(seen, heard)
-    said = tuple(map(str, remark.on_fused(fused)))
+def _both(ways: list[LitNotes], heard: Score) -> RecordingNotes:
+    """The notes of light and sound where they agree; else those that are less in doubt.
+
+    What the film leaves open of the names of the keys, the sound decides.
+    """
+    way, fused, decided = name_by_sound([each.score for each in ways], heard)
+    said = remark.on_fused(fused, TRANSCRIBE)
     if fused.alike:
-        score = replace(fused.score, remarks=(*seen.remarks, *said))
-        return RecordingNotes(score, "light and sound")
+        open_names = () if decided else ways[way].open_names
+        remarks = (*open_names, *ways[way].score.remarks, *map(str, said))
+        return RecordingNotes(replace(fused.score, remarks=remarks), "light and sound")
     if heard.remarks:
-        return RecordingNotes(replace(seen, remarks=(*seen.remarks, *said)), "light")
+        return _alone(ways[0], said)
     # No hands vouch for what lights up, and of the sound there is no doubt.
     seems = (
-        f"keys seem to light up as well, but {fused.both} of {len(seen)} notes that are seen are "
-        "among those that are heard: the notes are those of the sound (--notes light takes the "
-        "others)"
+        f"keys seem to light up as well, but {fused.both} of {len(fused.score)} notes that are "
+        "seen are among those that are heard: the notes are those of the sound (`pianomime "
+        "transcribe --notes light` takes the others)"
     )
     return RecordingNotes(replace(heard, remarks=(seems,)), "sound")

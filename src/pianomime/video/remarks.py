@@ -15,6 +15,7 @@ from pianomime.keyboard import FRAME_RATE, KEYS, key_name
 from pianomime.music import Score
 from pianomime.plan import LEFT, RIGHT, FingertipPlan
 from pianomime.shown import command_word
+from pianomime.video.advice import RETARGET, Advice
 from pianomime.video.confidence import Confidence
 from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.keyboard.geometry import WHITE_WIDTH
@@ -118,11 +119,12 @@ def no_keyboard(video: Path, told: Sequence[str] = ()) -> str:
     )
 
 
-def on_naming(keyboards: Sequence[Keyboard]) -> list[Remark]:
+def on_naming(keyboards: Sequence[Keyboard], advice: Advice) -> list[Remark]:
     """Remarks on what a picture leaves open about the names of the keys.
 
     Args:
         keyboards: the keyboard in each way to name its keys, the one that is assumed first.
+        advice: of the command.
     """
     remarks: list[Remark] = []
     if len(keyboards) < 2:  # marked by a person, or sure
@@ -130,15 +132,13 @@ def on_naming(keyboards: Sequence[Keyboard]) -> list[Remark]:
     assumed, *others = keyboards
     if any(other.lowest_c != assumed.lowest_c for other in others):
         text = f"the video leaves the octave open: {_lowest(assumed)}"
-        action = "name it with --octave; a MIDI file would decide"
-        remarks.append(Remark(text, action, "check"))
+        remarks.append(Remark(text, advice.octave, "check"))
     if any(other.mirrored != assumed.mirrored for other in others):
         text = (
             "the video may be mirrored or not: "
             f"{'mirrored' if assumed.mirrored else 'not mirrored'} is assumed"
         )
-        action = "tell it with --mirrored or --not-mirrored; a MIDI file would decide"
-        remarks.append(Remark(text, action, "check"))
+        remarks.append(Remark(text, advice.mirror, "check"))
     return remarks
 
 
@@ -149,8 +149,13 @@ def _lowest(keyboard: Keyboard) -> str:
     return f"its lowest key is taken for {key_name(int(np.flatnonzero(keyboard.seen)[0]))}"
 
 
-def on_stretches(view: View) -> list[Remark]:
-    """Remarks on stretches of a film whose names of keys are not sure, or contradict the others."""
+def on_stretches(view: View, advice: Advice) -> list[Remark]:
+    """Remarks on stretches of a film whose names of keys are not sure, or contradict the others.
+
+    Args:
+        view: the way in which the keyboard is seen.
+        advice: of the command.
+    """
     guessed = [
         (
             frame,
@@ -160,11 +165,7 @@ def on_stretches(view: View) -> list[Remark]:
     ]
     turned = [(frame, "the keyboard is mirrored unlike elsewhere") for frame in view.turned]
     return [
-        Remark(
-            f"from {frame / FRAME_RATE:.1f} s on {what}",
-            "look at the overlay from there; if it is wrong, cut the video there",
-            "check",
-        )
+        Remark(f"from {frame / FRAME_RATE:.1f} s on {what}", advice.stretch, "check")
         for frame, what in sorted(guessed + turned)
     ]
 
@@ -184,12 +185,13 @@ def on_unseen_keyboard(missing: NDArray[np.bool_]) -> list[Remark]:
     ]
 
 
-def on_told_names(plane: Plane, keyboards: Sequence[Keyboard]) -> list[Remark]:
+def on_told_names(plane: Plane, keyboards: Sequence[Keyboard], advice: Advice) -> list[Remark]:
     """Remarks on names of keys that a user told and the picture contradicts.
 
     Args:
         plane: as the user told it, by named points or options.
         keyboards: what is found in the picture without being told, in each way to name its keys.
+        advice: of the command.
     """
     if not keyboards:
         return []
@@ -207,8 +209,7 @@ def on_told_names(plane: Plane, keyboards: Sequence[Keyboard]) -> list[Remark]:
         Remark(
             f"the picture contradicts the names of the keys that are given: what they call "
             f"{key_name(KEYS // 2)} looks like {name}{mirror}",
-            "look at the pictures on the page; if the picture is right, leave out --points, "
-            "--octave and --mirrored, or mend them",
+            advice.told,
             "check",
         )
     ]
@@ -298,7 +299,7 @@ def on_sound(score: Score, offset: Offset, seconds: float) -> list[Remark]:
         offset: where they lie in the video.
         seconds: length of the video [s].
     """
-    remarks = on_late_sound(-offset.seconds)
+    remarks = on_late_sound(-offset.seconds, RETARGET)
     silence = seconds - offset.seconds - score.duration
     if silence > _LONG_END:
         text = f"the video goes on for {silence:.1f} s after the last note that is heard"
@@ -306,11 +307,12 @@ def on_sound(score: Score, offset: Offset, seconds: float) -> list[Remark]:
     return remarks
 
 
-def on_late_sound(late: float) -> list[Remark]:
+def on_late_sound(late: float, advice: Advice) -> list[Remark]:
     """Remarks on a sound that is not in time with its pictures.
 
     Args:
         late: how much later it is [s].
+        advice: of the command.
     """
     if abs(late) <= LATE_SOUND:
         return []
@@ -319,7 +321,7 @@ def on_late_sound(late: float) -> list[Remark]:
         Remark(
             f"the sound is {abs(late):.2f} s {when} than the pictures, by the notes in both: its "
             "notes are moved there",
-            f"if that is wrong, give another --offset than {-late:.2f}",
+            advice.late.format(offset=-late),
             "check",
         )
     ]
@@ -347,11 +349,12 @@ def on_heard(checked: Checked) -> list[Remark]:
     return remarks
 
 
-def on_fused(fused: Fused) -> list[Remark]:
+def on_fused(fused: Fused, advice: Advice) -> list[Remark]:
     """Remarks on how the notes that are seen and those that are heard agree.
 
     Args:
         fused: what became of both.
+        advice: of the command.
     """
     seen, heard = fused.both + fused.only_seen, fused.both + fused.only_heard
     if not fused.alike:
@@ -362,7 +365,7 @@ def on_fused(fused: Fused) -> list[Remark]:
         f"{fused.both} of {seen} notes are seen and heard; {fused.only_seen} only seen are kept, "
         f"{fused.only_heard} only heard are left out"
     )
-    return [*on_late_sound(fused.late), Remark(text)]
+    return [*on_late_sound(fused.late, advice), Remark(text)]
 
 
 def on_unused_sound(why: str) -> list[Remark]:

@@ -24,6 +24,7 @@ from pianomime.transcription.listener import Listener, can_listen, check_listene
 from pianomime.transcription.recording import Recording
 from pianomime.transcription.transcribe import transcribe
 from pianomime.video import remarks as remark
+from pianomime.video.advice import RETARGET
 from pianomime.video.align import Rule, align, raised
 from pianomime.video.confidence import Confidence, estimate_confidence
 from pianomime.video.film.background import background
@@ -39,10 +40,10 @@ from pianomime.video.keyboard.track import KeyboardTrack
 from pianomime.video.keyboard.views import MOST_FRAMES, View, find_views, view_of_points
 from pianomime.video.keyboard_look import KeyboardLook, look_at_keyboard
 from pianomime.video.notes.fingers import NoteFingers, find_note_fingers
-from pianomime.video.notes.fusion import Fused, fuse
 from pianomime.video.notes.heard import check_heard
 from pianomime.video.notes.key_light import ZONES, KeyLight
 from pianomime.video.notes.offset import LATE_SOUND, LATEST_SOUND, Offset, estimate_offset
+from pianomime.video.notes.open_names import name_by_sound
 from pianomime.video.notes.reading import ReadNotes, read_notes
 from pianomime.video.parallax import correct_parallax
 from pianomime.video.remarks import Remark
@@ -343,8 +344,10 @@ def _told(config: RetargetConfig) -> list[str]:
 def _on_told_names(given: _Given, view: View) -> list[Remark]:
     """Remarks on names of the keys that a user told, where the picture contradicts them."""
     if given.points is not None:
-        return remark.on_told_names(view.track.usual, find_keyboards(background(given.film)))
-    return remark.on_told_names(view.namings[0].plane, view.untold)
+        return remark.on_told_names(
+            view.track.usual, find_keyboards(background(given.film)), RETARGET
+        )
+    return remark.on_told_names(view.namings[0].plane, view.untold, RETARGET)
 
 
 def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
@@ -364,7 +367,7 @@ def _watch(given: _Given, views: list[View], progress: Progress) -> _Seen:
         remarks = [
             *taken.guessed,
             *_on_told_names(given, view),
-            *remark.on_stretches(view),
+            *remark.on_stretches(view, RETARGET),
             *remark.on_unseen_keyboard(missing),
             *remark.on_missing_hands(tracks),
             *remark.on_keyboard(look),
@@ -440,7 +443,9 @@ def _from_video(
     _check_hands(given, tracks)
     read = read_notes(lights[0], tracks, title_of(given.film.path))
     if read.lit:
-        taken = _Taken(0, tracks, _read_score(read), tuple(remark.on_naming(view.namings)))
+        taken = _Taken(
+            0, tracks, _read_score(read), tuple(remark.on_naming(view.namings, RETARGET))
+        )
         if given.may_listen:
             return _fused(given, views, taken, sightings, lights, progress)
         return taken
@@ -499,20 +504,22 @@ def _fused(
         said = remark.on_unused_sound(f"{error}".removeprefix(f"{given.film.path}: "))
         return taken._replace(timed=replace(timed, remarks=[*timed.remarks, *said]))
     early = given.config.offset
-    ways: list[tuple[_Taken, Fused]] = []
+    ways = [taken]
     for number, (view, light) in enumerate(zip(views, lights, strict=True)):
-        way = taken
         if number:
             tracks = follow(sightings, given.film.working_size, view.track)
             read = read_notes(light, tracks, title_of(given.film.path))
-            way = _Taken(number, tracks, _read_score(read))
-        ways.append((way, fuse(way.timed.score, heard, None if early is None else -early)))
-    most = max(fused.both for _, fused in ways)
-    near = [way for way in ways if way[1].both >= most - _BETTER * len(timed.score)]
-    # The likeliest of those that the sound does not tell apart.
-    best, fused = near[0]
+            guessed = tuple(remark.on_naming(view.namings, RETARGET))
+            ways.append(_Taken(number, tracks, _read_score(read), guessed))
+    late = None if early is None else -early
+    number, fused, decided = name_by_sound([way.timed.score for way in ways], heard, late)
+    best = ways[number]
     timed = best.timed
-    remarks = [*timed.remarks, *(Remark(text) for text in heard.remarks), *remark.on_fused(fused)]
+    remarks = [
+        *timed.remarks,
+        *(Remark(text) for text in heard.remarks),
+        *remark.on_fused(fused, RETARGET),
+    ]
     if not fused.alike:
         return taken._replace(timed=replace(taken.timed, remarks=remarks))
     facts = {
@@ -527,7 +534,7 @@ def _fused(
         best.view,
         best.tracks,
         replace(timed, score=on_grid(fused.score), facts=facts, remarks=remarks),
-        taken.guessed if len(near) > 1 else (),
+        () if decided else best.guessed,
     )
 
 
