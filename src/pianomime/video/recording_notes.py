@@ -21,15 +21,12 @@ from pianomime.video.lit_film import LitNotes, notes_of_lit_film, ways_of_lit_fi
 from pianomime.video.notes.open_names import name_by_sound
 from pianomime.video.remarks import Remark
 
-Notes = Literal["auto", "sound", "light"]
-"""What the notes are taken from, see `RecordingConfig.notes`."""
-
 
 @dataclass(frozen=True)
 class RecordingConfig:
     """What is known about a recording, and what of it is wanted."""
 
-    notes: Notes = "auto"
+    notes: Literal["auto", "sound", "light"] = "auto"
     """What the notes are taken from: the `sound`, or `light`, that is, keys that light up in a
     film. `auto` is both where keys light up and their notes are heard: keys are from light, and
     time, velocity and pedal from sound; else it is what there is of the two."""

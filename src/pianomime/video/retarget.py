@@ -55,9 +55,6 @@ _TOO_FEW_TOUCHED = 0.5
 _BETTER = 0.02
 """Share of notes by which a less likely octave must have more fingers on keys to be chosen."""
 
-Notes = Literal["auto", "midi", "light", "sound"]
-"""What the notes are taken from, see `RetargetConfig.notes`."""
-
 
 @dataclass(frozen=True)
 class RetargetConfig:
@@ -78,7 +75,7 @@ class RetargetConfig:
     """MediaPipe's hand_landmarker.task; by default it is downloaded once."""
     align: Rule = "steady"
     """How fingertips are moved onto the keys they press, see `align`."""
-    notes: Notes = "auto"
+    notes: Literal["auto", "midi", "light", "sound"] = "auto"
     """What the notes are taken from: `midi`; `light`, that is, keys that light up; or the `sound`
     of the video. `auto` is the MIDI file if there is one, else light where keys light up, else
     sound where the extra `audio` is installed and a piano is heard. Where there are both light and
