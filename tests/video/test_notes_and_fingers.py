@@ -53,9 +53,10 @@ def lamps(score, frames, spill=0.6, late=0):
     return np.clip(light, 0, 255).astype(np.uint8)
 
 
-def notes_read(light, *about):
+def notes_read(light, tracks, title, missing=None):
     with LightRecord.of(light) as record:
-        return read_notes(record, *about)
+        missing = np.zeros(len(light), bool) if missing is None else missing
+        return read_notes(record, tracks, missing, title)
 
 
 def offset_of(score, tracks, light):
@@ -151,6 +152,25 @@ def test_notes_are_read_where_there_are_no_hands(score, points):
     read = notes_read(lamps(score, len(points)), nobody(len(points)), "falling notes")
     assert read.lit
     assert onset_f1((score.key, score.onset), (read.score.key, read.score.onset), 0.1) > 0.97
+
+
+@pytest.mark.parametrize("seconds", [0.5, 2.0])
+@pytest.mark.parametrize("comes_back", [False, True])
+def test_light_that_is_not_shown(seconds, comes_back):
+    """In a title nothing is lit, unless it is short, and the key is lit before and after it."""
+    light = np.full((160, 3, 88, 3), DARK, np.uint8)
+    for number, key in enumerate((20, 30, 40, 50)):
+        light[8 * number : 8 * number + 6, 1, key] = (30, 90, 220)
+    gap = slice(50, 50 + round(20 * seconds))
+    light[40 : gap.stop + 10 * comes_back, 1, 60] = (30, 90, 220)  # as it was seen last
+    missing = np.zeros(160, bool)
+    missing[gap] = True
+    read = notes_read(light, nobody(160), "title", missing).score
+    spans = np.stack((read.onset, read.offset), axis=1)[read.key == 60] * 20
+    before, after = [40, 50], [gap.stop, gap.stop + 10]
+    bridged = comes_back and seconds < 1
+    expected = [[40, after[1]]] if bridged else [before, after] if comes_back else [before]
+    np.testing.assert_allclose(spans, expected)
 
 
 def test_nothing_is_read_off_noise(points):

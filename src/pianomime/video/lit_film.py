@@ -8,6 +8,9 @@ from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
@@ -132,9 +135,11 @@ def _read(film: Film, views: list[View], progress: Progress) -> list[LitNotes]:
             progress("keys", number + 1, max(total, number + 1))
         progress("notes", 0, 0)
         for view, light in zip(views, lights, strict=True):
-            read = read_notes(light, nobody(len(light)), title_of(film.path))
+            frames = len(light)
+            missing = view.track.missing(frames)
+            read = read_notes(light, nobody(frames), missing, title_of(film.path))
             if read.lit:
-                ways.append(_notes(view, read.score, len(light)))
+                ways.append(_notes(view, read.score, missing))
             else:
                 surest = max(surest, read.confidence)
     if not ways:
@@ -145,11 +150,11 @@ def _read(film: Film, views: list[View], progress: Progress) -> list[LitNotes]:
     return ways
 
 
-def _notes(view: View, score: Score, frames: int) -> LitNotes:
+def _notes(view: View, score: Score, missing: NDArray[np.bool_]) -> LitNotes:
     """The notes in a view, with remarks."""
     told = [
         *remark.on_stretches(view, TRANSCRIBE),
-        *remark.on_unseen_keyboard(view.track.missing(frames)),
+        *remark.on_unseen_keyboard(missing),
     ]
     if view.namings:
         told += remark.on_told_names(view.namings[0].plane, view.untold, TRANSCRIBE)

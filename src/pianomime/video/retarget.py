@@ -438,7 +438,7 @@ def _from_video(
     view = views[0]
     tracks = follow(sightings, given.film.working_size, view.track)
     _check_hands(given, tracks)
-    read = read_notes(lights[0], tracks, title_of(given.film.path))
+    read = _read(given, view, lights[0], tracks)
     if read.lit:
         taken = _Taken(
             0, tracks, _read_score(read), tuple(remark.on_naming(view.namings, RETARGET))
@@ -463,6 +463,11 @@ def _from_video(
 def _check_hands(given: _Given, tracks: HandTracks) -> None:
     if not tracks.seen.any():
         raise InputError(f"{given.film.path}: no hands are seen playing")
+
+
+def _read(given: _Given, view: View, light: LightRecord, tracks: HandTracks) -> ReadNotes:
+    """The notes of keys that light up in a view."""
+    return read_notes(light, tracks, view.track.missing(len(light)), title_of(given.film.path))
 
 
 def _read_score(read: ReadNotes) -> _Timed:
@@ -505,7 +510,7 @@ def _fused(
     for number, (view, light) in enumerate(zip(views, lights, strict=True)):
         if number:
             tracks = follow(sightings, given.film.working_size, view.track)
-            read = read_notes(light, tracks, title_of(given.film.path))
+            read = _read(given, view, light, tracks)
             guessed = tuple(remark.on_naming(view.namings, RETARGET))
             ways.append(_Taken(number, tracks, _read_score(read), guessed))
     late = None if early is None else -early

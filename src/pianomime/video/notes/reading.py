@@ -26,6 +26,8 @@ _SHORTEST = 2
 """Frames of the shortest note."""
 _FALSE = 2.0
 """Cost of a note that is no light or that no finger plays, relative to the value of another."""
+_BRIDGED = 1.0
+"""[s] Longest time without a keyboard in which a key that is lit before and after it stays lit."""
 _FEWEST = 3
 """Least number of notes of a film whose keys light up."""
 _VELOCITY = 80
@@ -73,7 +75,9 @@ class _Found(NamedTuple):
 _NOTHING = _Found(np.zeros((0, 3), np.int64), np.zeros(0, bool), np.zeros(0, bool), 0.0)
 
 
-def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
+def read_notes(
+    light: LightRecord, tracks: HandTracks, missing: NDArray[np.bool_], title: str
+) -> ReadNotes:
     """Read the notes that are most like light, and agree best with the fingers.
 
     All combinations of a patch of the keys, a measure of its change and a threshold are tried. The
@@ -83,6 +87,7 @@ def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
     Args:
         light: colours of the keys in each frame, see `KeyLight`.
         tracks: the tracked hands; where there are none at all, notes need no finger.
+        missing: (T,) bool, frames that show no keyboard: what is lit there is not known.
         title: title of the score.
     """
     points, away = tracks.seen_points(), unattended(tracks)
@@ -94,9 +99,10 @@ def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
     # Where no finger vouches for a note, its colour must.
     measures = (True, False) if hands else (True,)
     best, surest = _NOTHING, _NOTHING
+    gaps = _intervals(missing)
     for zone, colourful, share in product(range(len(ZONES)), measures, _SHARES):
         glow = Glow(light, away, zone, colourful)
-        runs = _runs(glow, share)
+        runs = _runs(glow, share, gaps)
         for level, notes in enumerate(runs):
             lit = are_lit(light, zone, glow.usual, notes, points)
             good = lit & _touched(notes, near)
@@ -121,12 +127,13 @@ def read_notes(light: LightRecord, tracks: HandTracks, title: str) -> ReadNotes:
     return ReadNotes(score, touched, lights, best.share if lights else 1 - surest.share)
 
 
-def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:
+def _runs(glow: Glow, share: float, gaps: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Notes whose glow rises above a level, until it falls below half of that level.
 
     Args:
         glow: change of each key.
         share: share of the neighbours' glow to subtract.
+        gaps: (G, 2) intervals that show no keyboard, as `_intervals` returns them.
 
     Returns:
         For each of `_LEVELS`, (N, 3) key, first frame, and frame after the last one.
@@ -136,9 +143,10 @@ def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:
         value = glow.standing_out(key, share)
         for level, arrays in zip(_LEVELS, found, strict=True):
             notes = []
-            lit = np.concatenate(([False], value > level / 2, [False]))
-            edges = np.flatnonzero(np.diff(lit.astype(np.int8)))
-            for first, end in edges.reshape(-1, 2).tolist():
+            lit = value > level / 2
+            for first, end in gaps.tolist():
+                lit[first:end] = _stays_lit(lit, first, end)
+            for first, end in _intervals(lit).tolist():
                 if end - first < _SHORTEST or value[first:end].max() <= level:
                     continue
                 # The note begins where the key is bright, not where its glow starts to rise.
@@ -146,6 +154,21 @@ def _runs(glow: Glow, share: float) -> list[NDArray[np.int64]]:
                 notes.append((key, bright, end))
             arrays.append(np.array(notes, np.int64).reshape(-1, 3))
     return [np.concatenate(arrays) for arrays in found]
+
+
+def _intervals(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(N, 2) First frame, and frame after the last one, of each interval in which (T,) holds."""
+    return np.flatnonzero(np.diff(holds.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+
+
+def _stays_lit(lit: NDArray[np.bool_], first: int, end: int) -> bool:
+    """Whether a key that is lit (T,) is so also in an interval that does not show it: a short one.
+
+    The light of a longer one may be that of another note.
+    """
+    if not 0 < first < end < len(lit) or end - first > _BRIDGED * FRAME_RATE:
+        return False
+    return bool(lit[first - 1] and lit[end])
 
 
 def _touched(notes: NDArray[np.int64], near: NDArray[np.bool_]) -> NDArray[np.bool_]:
