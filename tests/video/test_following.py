@@ -7,12 +7,14 @@ import pytest
 
 import made_up_video as made_up
 from pianomime.progress import no_progress
+from pianomime.video.advice import RETARGET
 from pianomime.video.film.background import median_of, sampled
 from pianomime.video.film.film import Film
 from pianomime.video.keyboard import views
-from pianomime.video.keyboard.following import follow_keyboard, stands_still
+from pianomime.video.keyboard.following import Stretch, follow_keyboard, stands_still
 from pianomime.video.keyboard.registration import Pyramid, Template
 from pianomime.video.keyboard.views import find_views
+from pianomime.video.remarks import on_stretches
 from pianomime.world.parameters import key_centres
 
 SIZE = (640, 360)
@@ -97,6 +99,60 @@ def test_after_a_cut_the_part_that_is_seen_is_named_like_the_whole(tmp_path):
     film = film_of(tmp_path / "film.mp4", moved)
     (view,) = find_views(film, MOST, None, None, no_progress)
     assert error(view.track, moved, range(80)) < 0.006
+
+
+WHOLE = made_up.picture(PLANE, SIZE)
+PART = made_up.picture(made_up.camera(SIZE, span=(-0.25, 0.2)), SIZE)
+"""A part of the keyboard on which no end is seen."""
+
+
+@pytest.fixture
+def shown(tmp_path, monkeypatch):
+    """The views of a film that shows pictures, each for a number of frames."""
+    film = film_of(tmp_path / "film.mp4", lambda _: None, 0.2)
+
+    def shown(*pictures):
+        stretches, first = [], 0
+        for picture, count in pictures:
+            where = np.broadcast_to(np.eye(3), (count, 3, 3))
+            stretches.append(Stretch(np.arange(first, first + count), where, picture, ()))
+            first += count
+        monkeypatch.setattr(views, "follow_keyboard", lambda *_: (stretches, first))
+        return find_views(film, MOST, None, None, no_progress)
+
+    return shown
+
+
+def test_stretches_that_are_guessed_or_contradict_the_others_are_told(shown):
+    (view,) = shown((WHOLE, 60), (PART, 40), (WHOLE[:, ::-1], 50))
+    assert "followed through 3 stretches" in view.description
+    assert view.frame == 0
+    part, mirrored = on_stretches(view, RETARGET)
+    assert part.text.startswith("from 3.0 s on the camera shows a part of the keyboard whose")
+    assert mirrored.text == "from 5.0 s on the keyboard is mirrored unlike elsewhere"
+    assert (part.weight, mirrored.weight) == ("check", "check")
+    assert (part.action, mirrored.action) == (RETARGET.stretch, RETARGET.stretch)
+
+
+def test_a_part_with_something_beside_it_is_named_like_the_whole(shown):
+    """What lies on some keys in both tells which they are."""
+    lamp = (27, 29, 31, 32)
+    whole = made_up.picture(PLANE, SIZE, lamp)
+    part = made_up.picture(made_up.camera(SIZE, span=(-0.35, 0.1)), SIZE, lamp)
+    (view,) = shown((whole, 60), (part, 40))
+    assert view.guessed == ()
+    seen = made_up.camera(SIZE, span=(-0.35, 0.1)).to_pixels(KEYS[20:40])
+    off = view.track.at(80).to_world(seen) - KEYS[20:40]
+    assert np.abs(off).max() < 0.004
+
+
+def test_a_brief_stretch_does_not_name_a_long_one(shown):
+    """Hands may hide as much of it in all its pictures."""
+    many = shown((WHOLE, 30), (PART, 100))
+    assert len(many) > 1
+    assert many[0].frame == 30
+    (one,) = shown((WHOLE, 60), (PART, 100))
+    assert one.frame == 0
 
 
 @pytest.mark.parametrize("moved", [lambda _: np.eye(3), swaying], ids=["still", "moving"])
