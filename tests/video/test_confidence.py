@@ -17,7 +17,7 @@ from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.keyboard_look import KeyboardLook, look_at_keyboard
 from pianomime.video.notes.fingers import find_note_fingers
-from pianomime.video.remarks import Remark, on_agreement, on_keyboard, on_lost_hands
+from pianomime.video.remarks import SOUND, Remark, on_agreement, on_keyboard, on_lost_hands
 from pianomime.video.repairs import list_repairs
 from pianomime.video.verdict import judge
 
@@ -77,6 +77,7 @@ def test_a_good_one(score, points):
     assert made.frames.min() > 0.8
     assert made.frames.mean() > 0.9
     assert made.better is None
+    assert made.tempo is None
     assert judge(made, []).grade == "good"
     assert len(made.by_second()) == np.ceil(len(points) / 20)
     assert made.by_second() == pytest.approx(made.frames[:-1].mean(), abs=0.2)
@@ -144,6 +145,7 @@ def test_another_song(points, seed):
     assert made.frames.mean() < 0.4
     remarks = on_agreement(made, "other.mid", 0.0)
     assert judge(made, remarks).grade == "doubtful"
+    assert "may not be what is played" in remarks[0].text
     assert "--" in remarks[0].action
 
 
@@ -158,6 +160,18 @@ def test_a_time_shift(score, points, seconds):
     (remark,) = on_agreement(made, "song.mid", 5.0)
     assert f"--offset {5.0 + made.better.seconds:.1f}" in remark.action
     assert judge(made, [remark]).grade == "doubtful"
+
+
+@pytest.mark.parametrize("ratio", [0.9, 1.1, 1.2])
+def test_slow_motion_with_a_sound_of_usual_speed(score, points, ratio):
+    heard = replace(score, onset=score.onset / ratio, offset=score.offset / ratio)
+    made = confidence(seen(points), heard)
+    assert made.tempo.ratio == pytest.approx(ratio, abs=0.02)
+    (remark,) = on_agreement(made, SOUND, 0.0)
+    percent = round(abs(100 * (made.tempo.ratio - 1)))
+    way = "slower" if ratio > 1 else "faster"
+    assert f"{percent} % {way} than its sound" in remark.text
+    assert judge(made, [remark]).grade != "good"
 
 
 @pytest.mark.parametrize("keys", [-12, -2, 1, 12])

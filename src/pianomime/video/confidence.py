@@ -21,6 +21,7 @@ from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.keyboard_look import KeyboardLook
 from pianomime.video.notes.agreement import PRIOR, Agreement, Shift, agreement, better_shift, beyond
 from pianomime.video.notes.fingers import NoteFingers
+from pianomime.video.notes.tempo import Tempo, better_tempo
 
 DOUBT = 0.5
 """Confidence below which a frame is in doubt."""
@@ -52,6 +53,7 @@ class Confidence:
         supported: (N,) bool, notes with a finger on their key at the onset that is also theirs.
         agreement: of all notes with the fingers.
         better: a shift of all notes with which they agree clearly better; None if there is none.
+        tempo: a tempo with which they do so; None if there is none.
     """
 
     hands: NDArray[np.float32]
@@ -62,6 +64,7 @@ class Confidence:
     supported: NDArray[np.bool_]
     agreement: Agreement
     better: Shift | None
+    tempo: Tempo | None
 
     __repr__ = short_repr
 
@@ -115,10 +118,10 @@ def estimate_confidence(
     """
     hands = _hands(tracks)
     # Where a hand is guessed, its fingers are evidence of nothing.
-    reliable = (hands > DOUBT)[: len(points), :, None, None]
+    reliable = (hands > DOUBT)[:, :, None, None]
     far = np.float32(np.inf)
-    agreed = agreement(score, np.where(reliable, points, far)[:, tracks.seen])
-    raw = np.where(reliable, tracks.points[: len(points)], far)[:, tracks.seen]
+    agreed = agreement(score, np.where(reliable[: len(points)], points, far)[:, tracks.seen])
+    raw = np.where(reliable, tracks.points, far)[:, tracks.seen]
     supported = agreed.touched & ~fingers.guessed
     notes = _notes(score, supported, agreed, missing) * notes_certainty
     keyboard = _ramp(look.usual, _HIDDEN, _USUAL) * ~missing
@@ -132,7 +135,8 @@ def estimate_confidence(
         missing,
         supported,
         agreed,
-        better_shift(score, raw),
+        better_shift(score, raw[: len(points)]),
+        better_tempo(score, raw),
     )
 
 

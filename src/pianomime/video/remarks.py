@@ -23,6 +23,7 @@ from pianomime.video.keyboard.keyboard import Keyboard
 from pianomime.video.keyboard.plane import Plane
 from pianomime.video.keyboard.views import View
 from pianomime.video.keyboard_look import KeyboardLook
+from pianomime.video.notes.agreement import beyond
 from pianomime.video.notes.fusion import Fused
 from pianomime.video.notes.heard import Checked
 from pianomime.video.notes.offset import LATE_SOUND, Offset
@@ -387,7 +388,26 @@ def on_agreement(confidence: Confidence, source: str, offset: float | None) -> l
     """
     if source == KEYS_AND_SOUND:
         offset = None  # their time is that of the light; the offset is the sound's
-    agreed, better = confidence.agreement, confidence.better
+    agreed, better, tempo = confidence.agreement, confidence.better, confidence.tempo
+    fits = 0.0 if better is None else better.touched
+    if (
+        offset is not None
+        and tempo is not None
+        and tempo.touched > fits
+        and beyond(tempo.touched, agreed.chance) >= _AGREE
+    ):
+        percent = abs(100 * (tempo.ratio - 1))
+        slower = "slower" if tempo.ratio > 1 else "faster"
+        what = "its sound" if source == SOUND else source
+        return [
+            Remark(
+                f"the film seems to be {percent:.0f} % {slower} than {what}: {tempo.touched:.0%} "
+                f"of the notes would have a finger on their key at its speed, {tempo.now:.0%} at "
+                "most have one at theirs",
+                "give a MIDI file at the speed of the film (--midi)",
+                "wrong" if agreed.beyond_chance < _MAY_AGREE else "check",
+            )
+        ]
     if better is not None and better.keys:
         far = abs(better.keys)
         up = "higher" if better.keys > 0 else "lower"

@@ -132,16 +132,26 @@ def better_shift(score: Score, points: NDArray[np.floating]) -> Shift | None:
     return best[len(best) // 2] if most_touched >= max(now + _BETTER, _FITS) else None
 
 
+def fingers_about(points: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """(88, T) Whether a finger is on each key in a frame or close to it.
+
+    Args:
+        points: (T, H, 6, 2) world x, y of the hands [m], infinite where a hand was not seen.
+    """
+    near = np.stack([touching(points, key) > _TOUCHED for key in range(KEYS)])
+    frame = np.arange(len(points))
+    about = np.zeros_like(near)
+    for step in _AROUND:
+        about |= near[:, np.clip(frame + step, 0, len(points) - 1)]
+    return about
+
+
 class _Touched:
     """Which notes have a finger on their key, also if all of them are shifted."""
 
     def __init__(self, score: Score, points: NDArray[np.floating]) -> None:
-        near = np.stack([touching(points, key) > _TOUCHED for key in range(KEYS)])
+        self._near = fingers_about(points)
         self._frames = len(points)
-        frame = np.arange(self._frames)
-        self._near = np.zeros_like(near)
-        for step in _AROUND:
-            self._near |= near[:, np.clip(frame + step, 0, self._frames - 1)]
         self._key = score.key
         self._onset = np.minimum(score.note_frames()[:, 0], self._frames - 1)
 
