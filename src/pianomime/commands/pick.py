@@ -56,13 +56,13 @@ class Pick:
         picture, second = clear_picture(film)
         with PickPage(film, picture, out, self.port) as page:
             out.parent.mkdir(parents=True, exist_ok=True)
-            print(f"click the points on {page.url} (Ctrl-C to cancel)", flush=True)
             if second is not None:
                 print(
-                    f"note: the camera moves, or the video is cut: the page shows the picture at "
+                    "note: the camera moves, or the video is cut: the page shows the picture at "
                     f"{second:.2f} s, and the points hold for that place alone; `pianomime "
                     "retarget` follows the keyboard where --points is not given"
                 )
+            print(f"click the points on {page.url} (Ctrl-C to cancel)", flush=True)
             if self.browser:
                 page.open_browser()
             saved = page.wait()
