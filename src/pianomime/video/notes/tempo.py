@@ -12,16 +12,16 @@ from pianomime.keyboard import FRAME_RATE
 from pianomime.music import Score
 from pianomime.video.notes.agreement import fingers_about
 
-_RATIOS = 1.01 ** np.arange(-22, 23)
-"""Speeds that are tried, 0.80 to 1.25; beyond, nobody takes one for the other."""
+_RATIOS = 0.8 * 1.01 ** np.arange(47)
+"""Speeds that are tried, 0.8 to 1.26; beyond, nobody takes one for the other."""
 _COMPARED = 60.0
 """[s] Notes that are compared, from the first one on: half a step of the speeds, and half of this
 time, is as long as fingers are over their keys before and after."""
-_FURTHEST = 30.0
+_FURTHEST = 25.0
 """[s] Most by which notes are placed elsewhere at any speed: none is better for that alone."""
 _BETTER = 0.1
 """Share of notes by which another speed must fit better to be told."""
-_FEWEST = 20
+_FEWEST = 25
 """Notes that are needed: few of them have a finger on their key at some speed or other."""
 
 
