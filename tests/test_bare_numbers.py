@@ -53,7 +53,10 @@ ALLOWED = {
     ("video/notes/lit.py", "_COLOURFUL = 30.0"),
     ("video/notes/lit.py", "_GAIN = 20.0"),
     ("video/notes/lit.py", "_SAME_HUE = 20.0"),
-    ("video/keyboard/naming.py", "_SIZES = ((0, len(WHITES), 0.0), (9, 36, float(np.log(22 / 2))))"),
+    (
+        "video/keyboard/naming.py",
+        "_SIZES = ((0, len(WHITES), 0.0), (9, 36, float(np.log(22 / 2))))",
+    ),
     # Times that have nothing to do with frames [s].
     ("music/metrics.py", "ONSET_TOLERANCE = 0.05"),
     ("music/protocol.py", "onset_tolerances: tuple[float, ...] = (0.050"),

@@ -61,7 +61,7 @@ def notes_read(light, tracks, title, missing=None):
 
 def offset_of(score, tracks, light):
     with LightRecord.of(light) as record:
-        return estimate_offset(score, tracks, record)
+        return estimate_offset(score, tracks, record, np.zeros(len(tracks), bool))
 
 
 def test_notes_are_read_off_light_that_spills(score, points):

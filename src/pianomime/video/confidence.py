@@ -120,7 +120,8 @@ def estimate_confidence(
     # Where a hand is guessed, its fingers are evidence of nothing.
     reliable = (hands > DOUBT)[:, :, None, None]
     far = np.float32(np.inf)
-    agreed = agreement(score, np.where(reliable[: len(points)], points, far)[:, tracks.seen])
+    seen = np.where(reliable[: len(points)], points, far)[:, tracks.seen]
+    agreed = agreement(score, seen, missing)
     raw = np.where(reliable, tracks.points, far)[:, tracks.seen]
     supported = agreed.touched & ~fingers.guessed
     notes = _notes(score, supported, agreed, missing) * notes_certainty
@@ -135,7 +136,7 @@ def estimate_confidence(
         missing,
         supported,
         agreed,
-        better_shift(score, raw[: len(points)]),
+        better_shift(score, raw[: len(points)], missing),
         better_tempo(score, raw),
     )
 

@@ -405,7 +405,8 @@ def _from_score(
     best: tuple[int, HandTracks, Offset] | None = None
     for number, (view, light) in enumerate(zip(views, lights, strict=True)):
         tracks = follow(sightings, given.film.working_size, view.track)
-        offset = estimate_offset(score, tracks, light, given.config.offset, *limits)
+        missing = view.track.missing(len(tracks))
+        offset = estimate_offset(score, tracks, light, missing, given.config.offset, *limits)
         if best is None or offset.touched > best[2].touched + _BETTER:
             best = number, tracks, offset
     assert best is not None

@@ -63,24 +63,26 @@ class Agreement:
 
     Attributes:
         touched: (N,) bool, notes with a finger on their key about the onset.
-        chance: share of notes that would have one by chance, 0..1.
+        shown: (N,) bool, notes whose onset is in a frame with a keyboard; others prove nothing.
+        chance: share of notes that would have a finger on their key by chance, 0..1.
     """
 
     touched: NDArray[np.bool_]
+    shown: NDArray[np.bool_]
     chance: float
 
     __repr__ = short_repr
 
     @property
     def share(self) -> float:
-        """Share of the notes with a finger on their key, 0..1."""
-        return float(self.touched.mean()) if len(self.touched) else 0.0
+        """Share of the notes that are shown with a finger on their key, 0..1."""
+        return float(self.touched[self.shown].mean()) if self.shown.any() else 0.0
 
     @property
     def beyond_chance(self) -> float:
         """Agreement beyond chance: 1 if all notes agree, 0 (or less) if no more than by chance."""
-        notes = len(self.touched)
-        share = (self.touched.sum() + PRIOR * self.chance) / (notes + PRIOR)
+        touched = self.touched[self.shown]
+        share = (touched.sum() + PRIOR * self.chance) / (len(touched) + PRIOR)
         return float(beyond(share, self.chance))
 
 
@@ -94,38 +96,41 @@ def beyond(share: float | NDArray[np.float64], chance: float) -> float | NDArray
     return (share - chance) / (1 - chance)
 
 
-def agreement(score: Score, points: NDArray[np.floating]) -> Agreement:
+def agreement(score: Score, points: NDArray[np.floating], missing: NDArray[np.bool_]) -> Agreement:
     """Compare the notes of a score with the fingers of a video.
 
     Args:
         score: the notes, in the time of the video.
         points: (T, H, 6, 2) world x, y of the hands [m], infinite where a hand was not seen.
+        missing: (T,) bool, frames that show no keyboard.
     """
-    touched = _Touched(score, points)
+    touched = _Touched(score, points, missing)
     frames, least = len(points), round(_LEAST_LAG * FRAME_RATE)
-    shares = [touched(keys=step).mean() for step in range(-_OCTAVE, _OCTAVE + 1) if step]
+    shares = [touched.share(keys=step) for step in range(-_OCTAVE, _OCTAVE + 1) if step]
     if frames > 2 * least:
         lags = np.unique(np.linspace(least, frames - least, _LAGS).astype(np.int64))
-        shares.append(np.median([touched(lag=int(lag), around=True).mean() for lag in lags]))
-    return Agreement(touched(), min(float(max(shares)), _MOST_CHANCE))
+        shares.append(np.median([touched.share(lag=int(lag), around=True) for lag in lags]))
+    chance = min(float(max(shares)), _MOST_CHANCE)
+    return Agreement(touched(), touched.shown(), chance)
 
 
-def better_shift(score: Score, points: NDArray[np.floating]) -> Shift | None:
+def better_shift(
+    score: Score, points: NDArray[np.floating], missing: NDArray[np.bool_]
+) -> Shift | None:
     """The shift with which clearly more notes have a finger on their key; None if there is none.
 
     Args:
         score: the notes, in the time of the video.
         points: (T, H, 6, 2) world x, y of the hands [m], infinite where a hand was not seen; as
             they were tracked, as a correction of parallax fits them to the notes without a shift.
+        missing: (T,) bool, frames that show no keyboard.
     """
-    touched = _Touched(score, points)
+    touched = _Touched(score, points, missing)
     least, most = round(_LEAST_LAG * FRAME_RATE), round(_LIKELY_LAG * FRAME_RATE)
-    now = float(touched().mean())
+    now = touched.share()
     shifts = [(keys, 0) for keys in range(-2 * _OCTAVE, 2 * _OCTAVE + 1) if keys]
     shifts += [(0, lag) for lag in range(-most, most + 1) if abs(lag) >= least]
-    tried = [
-        Shift(keys, lag / FRAME_RATE, float(touched(keys, lag).mean()), now) for keys, lag in shifts
-    ]
+    tried = [Shift(keys, lag / FRAME_RATE, touched.share(keys, lag), now) for keys, lag in shifts]
     most_touched = max(shift.touched for shift in tried)
     best = [shift for shift in tried if shift.touched == most_touched]
     # Fingers are over their keys for a while, so that some times are as good: the middle one is it.
@@ -149,9 +154,12 @@ def fingers_about(points: NDArray[np.floating]) -> NDArray[np.bool_]:
 class _Touched:
     """Which notes have a finger on their key, also if all of them are shifted."""
 
-    def __init__(self, score: Score, points: NDArray[np.floating]) -> None:
+    def __init__(
+        self, score: Score, points: NDArray[np.floating], missing: NDArray[np.bool_]
+    ) -> None:
         self._near = fingers_about(points)
         self._frames = len(points)
+        self._missing = missing[: self._frames]
         self._key = score.key
         self._onset = np.minimum(score.note_frames()[:, 0], self._frames - 1)
 
@@ -163,9 +171,23 @@ class _Touched:
             lag: number of frames.
             around: notes past the end begin again at the beginning; else no finger is there.
         """
-        key, frame = self._key + keys, self._onset + lag
-        if around:
-            frame = frame % self._frames
+        key, frame = self._key + keys, self._at(lag, around)
         inside = (key >= 0) & (key < KEYS) & (frame >= 0) & (frame < self._frames)
         on_it = self._near[np.clip(key, 0, KEYS - 1), np.clip(frame, 0, self._frames - 1)]
         return np.asarray(on_it & inside)
+
+    def shown(self, lag: int = 0, around: bool = False) -> NDArray[np.bool_]:
+        """(N,) bool, notes that are not in a frame without a keyboard, shifted as above."""
+        frame = self._at(lag, around)
+        inside = (frame >= 0) & (frame < self._frames)
+        return np.asarray(~(self._missing[np.clip(frame, 0, self._frames - 1)] & inside))
+
+    def share(self, keys: int = 0, lag: int = 0, around: bool = False) -> float:
+        """Share of the notes that are shown with a finger on their key, shifted as above."""
+        shown = self.shown(lag, around)
+        return float(self(keys, lag, around)[shown].mean()) if shown.any() else 0.0
+
+    def _at(self, lag: int, around: bool) -> NDArray[np.int64]:
+        """(N,) frame of each note."""
+        frame = self._onset + lag
+        return frame % self._frames if around else frame

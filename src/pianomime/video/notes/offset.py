@@ -34,7 +34,7 @@ class Offset:
 
     Attributes:
         seconds: a note at time t of the file is at t + seconds in the video [s].
-        touched: share of the notes within the video that have a finger on their key.
+        touched: share of the notes at which the video shows a keyboard that have a finger on their key.
         by_chance: median of that share over all offsets, as it would be for another song.
     """
 
@@ -47,6 +47,7 @@ def estimate_offset(
     score: Score,
     tracks: HandTracks,
     light: LightRecord,
+    missing: NDArray[np.bool_],
     given: float | None = None,
     usual: float = np.inf,
     most: float = np.inf,
@@ -57,6 +58,7 @@ def estimate_offset(
         score: score of the MIDI file.
         tracks: the tracked hands.
         light: colours of the keys in each frame, see `KeyLight`.
+        missing: (T,) bool, frames that show no keyboard: notes there prove nothing.
         given: the offset [s], if it is known; then only its fit is measured.
         usual: how far from 0 it usually is [s]; beyond that, the evidence must be clear.
         most: how far from 0 it may be [s].
@@ -64,8 +66,8 @@ def estimate_offset(
     points, away = tracks.seen_points(), unattended(tracks)
     onset = np.floor(score.onset * FRAME_RATE + 0.5).astype(np.int64)
     lags = np.arange(-int(onset.max()), len(points))
-    # Number of notes within the video, for every lag.
-    counts = np.rint(fftconvolve(np.ones(len(points)), np.bincount(onset)[::-1]))
+    # Number of notes that are shown, for every lag.
+    counts = np.rint(fftconvolve((~missing).astype(np.float64), np.bincount(onset)[::-1]))
 
     def mean(
         value: Callable[[int], NDArray[np.float32] | NDArray[np.bool_]],
