@@ -34,7 +34,7 @@ class Offset:
 
     Attributes:
         seconds: a note at time t of the file is at t + seconds in the video [s].
-        touched: share of the notes at which the video shows a keyboard that have a finger on their key.
+        touched: share of the notes with a finger on their key, of those at which a keyboard shows.
         by_chance: median of that share over all offsets, as it would be for another song.
     """
 
