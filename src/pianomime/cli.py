@@ -107,6 +107,9 @@ COMMANDS = {
     "collect-dagger": Command(
         "pianomime.commands.collect_dagger", "CollectDagger", "make a data set by DAgger"
     ),
+    "export-data": Command(
+        "pianomime.commands.export_data", "ExportData", "write a data set for LeRobot or Minari"
+    ),
     "train-goal": Command(
         "pianomime.commands.train_goal", "TrainGoal", "train the goal autoencoder", goes_on=True
     ),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Collection, Iterable, Iterator
+import shutil
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -86,6 +87,55 @@ def staged(out: Path, ours: Collection[str], name: str | None = None) -> Iterato
             _move(temporary, real, ours)
         except OSError as error:
             raise _cannot_be_written(out, error) from error
+
+
+@contextmanager
+def new_folder(path: Path, is_ours: Callable[[Path], bool], kind: str) -> Iterator[Path]:
+    """Write a folder all or nothing; an older one of the same kind at its place is replaced.
+
+    Yields where to write, at which there is nothing yet. Any exception in the block, Ctrl-C too,
+    removes what was written and leaves the older one as it was.
+
+    Args:
+        path: where the folder should end up; the folder that it is in must exist.
+        is_ours: whether the folder at a path may be replaced.
+        kind: what is replaced, such as "a data set".
+
+    Raises:
+        InputError: there is something else at the place, or another process writes there.
+        OSError: it cannot be written.
+    """
+    with hold(path) as folder:
+        # Not in the folder, which the next process sweeps: for a moment it is the only one.
+        older = path.with_name(_aside(path.name))
+        if older.exists():
+            _undo(older, path)
+        if path.exists() and not is_ours(path):
+            raise InputError(f"{path}: is something else than {kind}")
+        fresh = Path(folder, path.name)
+        yield fresh
+        if path.exists():
+            os.replace(path, older)
+        try:
+            os.replace(fresh, path)
+        except BaseException:
+            if older.exists():
+                _undo(older, path)
+            raise
+        shutil.rmtree(older, ignore_errors=True)
+
+
+def _aside(name: str) -> str:
+    """Where a folder is while another takes its place: a hash, for names may be long."""
+    return f".pianomime-older-{hashlib.sha256(os.fsencode(name)).hexdigest()[:16]}"
+
+
+def _undo(older: Path, path: Path) -> None:
+    """Put a folder back that was set aside; if the new one is in its place, it is not needed."""
+    if path.exists():
+        shutil.rmtree(older)
+    else:
+        os.replace(older, path)
 
 
 @contextmanager

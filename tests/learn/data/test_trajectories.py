@@ -100,7 +100,7 @@ def test_what_fails_leaves_the_older_data(
 
     episode = TrajectoryData.open(out).episode(0)
     with monkeypatch.context() as patch:
-        patch.setattr("pianomime.learn.data.trajectories.os.replace", fails)
+        patch.setattr("pianomime.files.os.replace", fails)
         with pytest.raises(OSError, match="cannot be moved"):
             write_trajectories(out, iter([episode]))
     assert len(TrajectoryData.open(out)) == 2
@@ -338,9 +338,9 @@ def test_killed_while_one_replaces_another(
             raise Killed
 
     with monkeypatch.context() as patch:
-        patch.setattr("pianomime.learn.data.trajectories.os.replace", killed)
+        patch.setattr("pianomime.files.os.replace", killed)
         # A killed process puts nothing back.
-        patch.setattr("pianomime.learn.data.trajectories._undo", lambda older, path: None)
+        patch.setattr("pianomime.files._undo", lambda older, path: None)
         with pytest.raises(Killed):
             write_trajectories(out, iter([Episode("new", 0.0, "ik", columns)]))
     assert out.exists() == (moment == "after")

@@ -18,9 +18,6 @@ digest of each column of each episode, too: a chunk that is gone reads as zeros.
 
 from __future__ import annotations
 
-import hashlib
-import os
-import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +29,7 @@ from numpy.typing import NDArray
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from pianomime.errors import InputError, reason_of
+from pianomime.files import new_folder
 from pianomime.learn.data.episode import COLUMNS, Column, Episode
 from pianomime.learn.data.format import FORMAT, VERSION, is_data_set, zarr_attributes
 from pianomime.schema import Field, ListOf, Schema, short
@@ -39,7 +37,6 @@ from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
 from pianomime.short_repr import short_repr
 from pianomime.shown import shown
-from pianomime.staging import hold
 from pianomime.world_names import PAPER, WORLDS
 
 _CHUNK = 4096
@@ -80,15 +77,8 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
         OSError: it cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with hold(path) as folder:
-        # Not in the folder, which the next process sweeps: for a moment it is the only data set.
-        older = path.with_name(_aside(path.name))
-        if older.exists():
-            _undo(older, path)
-        # One of an earlier version, or a damaged one, is replaced as well.
-        if path.exists() and not is_data_set(path):
-            raise InputError(f"{path}: is something else than a data set")
-        fresh = Path(folder, path.name)
+    # One of an earlier version, or a damaged one, is replaced as well.
+    with new_folder(path, is_data_set, "a data set") as fresh:
         group = zarr.open_group(str(fresh), mode="w", zarr_format=3)
         for name, column in COLUMNS.items():
             array = group.create_array(
@@ -125,15 +115,6 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
         end_array.attrs["description"] = "one past the last row of each episode"
         content = {"format": FORMAT, "version": VERSION, "ends": ends[1:], "episodes": rows}
         group.attrs.update(sealed(content))
-        if path.exists():
-            os.replace(path, older)
-        try:
-            os.replace(fresh, path)
-        except BaseException:
-            if older.exists():
-                _undo(older, path)
-            raise
-        shutil.rmtree(older, ignore_errors=True)
     return len(rows)
 
 
@@ -246,19 +227,6 @@ def check_one_world(first: Mapping[str, Any], name: str, world: str) -> None:
             f"{shown(name)} was played in the world {world}, {shown(first['name'])} in "
             f"{first['world']}: a data set is of one world"
         )
-
-
-def _aside(name: str) -> str:
-    """Where a data set is while another takes its place: a hash, for names may be long."""
-    return f".pianomime-older-{hashlib.sha256(os.fsencode(name)).hexdigest()[:16]}"
-
-
-def _undo(older: Path, path: Path) -> None:
-    """Put a data set back that was set aside; if the new one is in its place, it is not needed."""
-    if path.exists():
-        shutil.rmtree(older)
-    else:
-        os.replace(older, path)
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
