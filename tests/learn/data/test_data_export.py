@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shutil
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from pianomime.cli import main
+from pianomime.errors import InputError
 from pianomime.learn.data.data_export import MARK, DataFormat, export_data
 from pianomime.learn.data.episode import COLUMNS, Episode
 from pianomime.learn.data.feature_stats import RunningStats, episode_stats
@@ -216,6 +218,23 @@ def test_only_exports_are_replaced(
     mark = json.loads((out / MARK).read_text("utf-8"))
     assert mark["numbers"]["action"][-1].endswith("[m]")
     assert [each.name for each in tmp_path.iterdir()] == ["out-v0"]
+
+
+@pytest.mark.parametrize("data_format", ["lerobot", "minari"])
+def test_what_fails_leaves_the_older_export(
+    data: TrajectoryData, tmp_path: Path, data_format: DataFormat
+) -> None:
+    pytest.importorskip("pyarrow", reason="the extra data is not installed")
+    pytest.importorskip("h5py", reason="the extra data is not installed")
+    out = tmp_path / "out-v0"
+    export_data(data, out, data_format)
+    before = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+    # The last episode alone is damaged, when two are written.
+    damaged = dataclasses.replace(data, episodes=[*data.episodes[:-1], {**data.episodes[-1]}])
+    damaged.episodes[-1]["digests"] = dict.fromkeys(COLUMNS, "another")
+    with pytest.raises(InputError, match="was changed"):
+        export_data(damaged, out, data_format)
+    assert {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()} == before
 
 
 @pytest.mark.parametrize(
