@@ -19,6 +19,7 @@ ROOMS = (
     ),
     ("file_names", "staging", "schema", "seal"),
     ("files", "archive", "local_server", "mp4", "sealed_json", "validation", "web_page", "workers"),
+    ("ray_cluster",),
     ("media",),
     ("music",),
     ("songs",),
@@ -64,7 +65,7 @@ VIDEO = (
     ("summary",),
 )
 
-LEARN_ONLY = ("torch", "stable_baselines3", "diffusers", "accelerate", "gymnasium", "ray")
+LEARN_ONLY = ("torch", "stable_baselines3", "diffusers", "accelerate", "gymnasium")
 """Libraries that only learn/ imports."""
 LISTENER = ("pianomime.transcription.transkun", "torch")
 """The one file elsewhere that imports one of them, and is imported when it is needed."""

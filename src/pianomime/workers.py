@@ -237,7 +237,13 @@ def _release(process: subprocess.Popen[str]) -> None:
                 stream.close()
 
 
-def _loaded(function: str, setup: Any) -> Answer:
+def load_answer(function: str, setup: Any) -> Answer:
+    """Load what answers requests; one that cannot be loaded answers each with the reason.
+
+    Args:
+        function: what loads it, as "package.module:function".
+        setup: what the function is given.
+    """
     module, _, name = function.partition(":")
     try:
         answer: Answer = getattr(importlib.import_module(module), name)(setup)
@@ -281,7 +287,7 @@ def _answer_all(
     requests: queue.SimpleQueue[str], answers: TextIO, received: Collection[int]
 ) -> None:
     """Answer until a signal is received, also where that was turned into another error."""
-    answer = _loaded(sys.argv[1], json.loads(requests.get()))
+    answer = load_answer(sys.argv[1], json.loads(requests.get()))
 
     def checked(request: Any) -> Row:
         row = answer(request)

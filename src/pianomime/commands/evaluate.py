@@ -37,6 +37,7 @@ class Evaluate:
       pianomime evaluate FOLDER --player zero-shot-ik --seconds 60
       pianomime evaluate FOLDER --lead-in 0.5
       pianomime evaluate FOLDER --world solid
+      pianomime evaluate FOLDER --ray HOST:6379 -o /shared/all
       pianomime evaluate FOLDER --lead-in 0.5 --robust
       pianomime evaluate DEMO.npz DEMOS/*.npz --player demonstration
       pianomime evaluate FOLDER --player my_module:make_player --planner.beam 200
@@ -69,6 +70,9 @@ class Evaluate:
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
     """Songs played at the same time; one a core if not given. They slow each other down: compare
     real time only between runs with the same N."""
+    ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS", help_behavior_hint="")] = None
+    """Address of a Ray cluster to play on, all of whose nodes see the songs and OUT; `auto` for the
+    cluster that this machine is part of, `local` for a new one on this machine."""
     seed: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Seed of everything that is random."""
     robust: bool = False
@@ -93,6 +97,11 @@ class Evaluate:
         from pianomime.file_names import file_name
         from pianomime.shown import command_word, shown
 
+        if self.ray is not None:
+            # Not before it is needed: it imports what is there of learning.
+            from pianomime.commands.needs import RAY, need_packages
+
+            need_packages("scale", RAY)
         seeded = f"-seed{self.seed}" if self.seed else ""
         # A player may be called by a path or a module.
         there = f"-{self.world}" if self.world else ""
@@ -109,6 +118,7 @@ class Evaluate:
                 seconds=self.seconds,
                 lead_in=self.lead_in,
                 jobs=self.jobs,
+                ray=self.ray,
                 out=out,
                 progress=progress,
             )

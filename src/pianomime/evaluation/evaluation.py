@@ -58,6 +58,7 @@ def evaluate(
     seconds: float = EXCERPT_SECONDS,
     lead_in: float = 0.0,
     jobs: int | None = None,
+    ray: str | None = None,
     out: str | Path | None = None,
     progress: Progress = no_progress,
 ) -> dict[str, Any]:
@@ -84,6 +85,8 @@ def evaluate(
             protocol.
         jobs: processes; one a core that this one may use if None. They share the cores, so
             `realtime_factor` and the times depend on it.
+        ray: address of a Ray cluster that plays instead, whose nodes all see the songs and `out`;
+            "local" starts one here.
         out: folder for `results.json` and `results.md`, and the finished songs with their
             performances in `songs/`.
         progress: called with the songs done, the songs in all and their mean F1 so far.
@@ -125,6 +128,8 @@ def evaluate(
     casting.check_lead_in(lead_in)
     # Other processes cannot load such a player, and nobody can tell what it depends on.
     only_here = isinstance(player, Player) or is_registered(player)
+    if only_here and ray is not None:
+        raise InputError("ray: other machines cannot load a player that exists in this process")
     made_by = ""
     if not only_here:
         files = files_digest(player_files(str(player)))
@@ -152,7 +157,11 @@ def evaluate(
                 report()
 
         def request(song: Path) -> dict[str, str]:
-            return song_request(song, None if store is None else store.performance(song))
+            kept = None if store is None else store.performance(song)
+            if ray is None:
+                return song_request(song, kept)
+            # Processes of a cluster work in folders of their own.
+            return song_request(song.resolve(), None if kept is None else kept.resolve())
 
         if only_here:
             playing = _in_this_process(waiting, casting, seconds, lead_in, request)
@@ -166,7 +175,12 @@ def evaluate(
                 "seconds": seconds,
                 "lead_in": lead_in,
             }
-            playing = work(SONG_WORKER, waiting, jobs or cores(), setup, request)
+            if ray is None:
+                playing = work(SONG_WORKER, waiting, jobs or cores(), setup, request)
+            else:
+                from pianomime.ray_cluster import on_cluster
+
+                playing = on_cluster(SONG_WORKER, waiting, ray, setup, request)
         with closing(playing) as played:
             for song, result in played:
                 row = {"song": title_of(song), **result}

@@ -76,9 +76,9 @@ def train_experts(
         if ray is None:
             trained = work(EXPERT_WORKER, requests, jobs or cores(), request=requests.__getitem__)
         else:
-            from pianomime.learn.expert.ray_cluster import on_cluster
+            from pianomime.ray_cluster import on_cluster
 
-            trained = on_cluster(requests, ray)
+            trained = on_cluster(EXPERT_WORKER, requests, ray, request=requests.__getitem__)
         with closing(trained):
             for name, row in trained:
                 rows[name] = {"song": name, **row}
