@@ -15,7 +15,7 @@ import yaml
 
 import pianomime
 from pianomime.cli import COMMANDS, main
-from pianomime.learn.data.episode import COLUMNS
+from pianomime.learn.data.episode import COLUMNS, EVENTS
 from pianomime.plan import ZeroShotPlanner
 
 ROOT = Path(__file__).parents[1]
@@ -183,7 +183,7 @@ def test_the_reference_names_every_array_of_a_demonstration(
 
 def test_the_reference_names_every_array_of_a_data_set() -> None:
     shown = named(section("file-formats.md", "Experts' data set (zarr)"))
-    assert shown == {*COLUMNS, "episode_end"}
+    assert shown == {*COLUMNS, *EVENTS, "episode_end", "event_end"}
 
 
 def test_the_reference_names_everything_in_results() -> None:

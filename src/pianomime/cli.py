@@ -110,6 +110,12 @@ COMMANDS = {
     "export-data": Command(
         "pianomime.commands.export_data", "ExportData", "write a data set for LeRobot or Minari"
     ),
+    "perform": Command(
+        "pianomime.commands.perform",
+        "Perform",
+        "make a data set of songs that a player plays",
+        goes_on=True,
+    ),
     "train-goal": Command(
         "pianomime.commands.train_goal", "TrainGoal", "train the goal autoencoder", goes_on=True
     ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pianomime.keyboard import NO_KEY
-from pianomime.learn.data import dagger
+from pianomime.learn.data.noisy_controller import NoisyController, noise_spread
 from pianomime.plan import FingertipPlan
 from pianomime.track import ReplayTracker
 from pianomime.world import World
@@ -23,9 +23,7 @@ def test_arms_get_as_much_noise_as_moves_a_fingertip_as_far() -> None:
         np.zeros((FRAMES, 2, 6, 3)), np.full((FRAMES, 2, 5), NO_KEY, np.int8), nobody, nobody
     )
     expert = ReplayTracker(np.ones((FRAMES, LAYOUT.ctrl_size))).start(plan)
-    noisy = dagger._DaggerController(
-        expert, None, size * dagger._NOISE_SCALE, correlation, np.random.default_rng(0)
-    )
+    noisy = NoisyController(expert, None, noise_spread(size), correlation, np.random.default_rng(0))
     world = World()
     noise = np.array([noisy.control(frame, world) for frame in range(FRAMES)]) - 1.0
     # What is recorded is what the expert does.

@@ -8,8 +8,6 @@ import pytest
 from pianomime import Score, load_player
 from pianomime.errors import InputError
 from pianomime.learn.data.episode import record
-from pianomime.plan import ZeroShotPlanner
-from pianomime.track import IkTracker
 
 
 @pytest.fixture
@@ -20,8 +18,7 @@ def score() -> Score:
 
 def test_controls_are_recorded_as_they_were_sent(score: Score) -> None:
     player = load_player("zero-shot-20hz", effort=0)
-    base = IkTracker().start(ZeroShotPlanner().plan(score))
-    columns = record(player.start(score), base, score)
+    columns = record(player.start(score), score).columns
     sent = player.play(score).ctrl[:, 0]
     np.testing.assert_array_equal(columns["action"], sent.astype(np.float32))
 
@@ -29,7 +26,6 @@ def test_controls_are_recorded_as_they_were_sent(score: Score) -> None:
 @pytest.mark.parametrize("effort", [0, 1])
 def test_several_controls_a_frame_are_no_action(score: Score, effort: int) -> None:
     player = load_player("zero-shot", effort)
-    base = IkTracker().start(ZeroShotPlanner().plan(score))
     with pytest.raises(InputError, match=r"one control a frame, not 5: .* zero-shot-20hz") as error:
-        record(player.start(score), base, score)
+        record(player.start(score), score)
     assert "\n" not in str(error.value)

@@ -17,11 +17,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pianomime.errors import InputError, WorkFailed
 from pianomime.learn.data.dagger_config import DaggerConfig
-from pianomime.learn.data.episode import Episode, fill_columns, record
+from pianomime.learn.data.episode import Episode, base_controls, fill_columns, record
+from pianomime.learn.data.noisy_controller import NoisyController, noise_spread
 from pianomime.plan.demonstration import Demonstration
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.finger_assignment import flat_heights
@@ -30,20 +30,13 @@ from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.network_file import load_policy
 from pianomime.policies.sampler import Sampler
 from pianomime.staging import scratch
-from pianomime.track import Controller, DynamicTracker, IkTracker
-from pianomime.track.dynamic import DynamicController
+from pianomime.track import DynamicTracker, IkTracker
 from pianomime.workers import Answer, Row, cores, work
-from pianomime.world import World
-from pianomime.world.hand import by_actuator
-from pianomime.world.layout import LAYOUT
 
 _WORKER = "pianomime.learn.data.dagger:load_dagger_worker"
 
 _FAST = Sampler(steps=2)
 """Sampling of the policies that play: there are many frames, and rough actions will do."""
-
-_NOISE_SCALE = by_actuator(1.0, 0.3, 0.03)
-"""(46,) [rad, m] noise of each actuator that moves fingertips about as far as 1 rad of a finger."""
 
 
 def collect_dagger_episode(
@@ -65,7 +58,7 @@ def collect_dagger_episode(
         InputError: a policy cannot be read.
     """
     rng = np.random.default_rng([config.seed, number])
-    spread = config.noise * rng.random() * _NOISE_SCALE
+    spread = noise_spread(config.noise * rng.random())
     seeds = rng.integers(2**31, size=2).tolist()
     score = demonstration.score
     if config.fingertip_policy is None:
@@ -79,53 +72,12 @@ def collect_dagger_episode(
     if config.rollout_policy is not None:
         played = load_policy_tracker(config.rollout_policy, _FAST, seeds[0]).start(plan)
     expert = DynamicTracker().start(feasible)
-    controller = _DaggerController(expert, played, spread, config.noise_correlation, rng)
-    columns = record(controller, IkTracker().start(plan), score)
+    controller = NoisyController(expert, played, spread, config.noise_correlation, rng)
+    columns, qpos, events, _ = record(controller, score)
     columns["action"][:] = controller.labels
-    f1 = fill_columns(columns, score.roll(), plan.fingertips, plan.finger_key)
-    return Episode(score.title, f1, "ik", columns, demonstration.song_id)
-
-
-class _DaggerController:
-    """Plays a policy, or the expert, with noise, and keeps what the expert would do.
-
-    Attributes:
-        replayable: False, for every call draws noise.
-        plan: what the expert follows.
-        labels: (T, 46) the expert's control in the state before each frame [rad, m].
-
-    Args:
-        expert: the expert.
-        policy: plays instead of it, if given.
-        spread: (46,) standard deviation of the noise [rad, m].
-        correlation: of the noise from frame to frame: an autoregressive process of order 1.
-        rng: of the noise.
-    """
-
-    replayable = False
-
-    def __init__(
-        self,
-        expert: DynamicController,
-        policy: Controller | None,
-        spread: NDArray[np.float64],
-        correlation: float,
-        rng: np.random.Generator,
-    ) -> None:
-        self.plan = expert.plan
-        self.labels = np.empty((len(expert.plan), LAYOUT.ctrl_size))
-        self._expert, self._policy = expert, policy
-        self._spread, self._correlation, self._rng = spread, correlation, rng
-        self._noise = np.zeros(LAYOUT.ctrl_size)
-
-    def control(self, frame: int, world: World) -> NDArray[np.float64]:
-        """As `Controller.control`."""
-        action = self.labels[frame] = self._expert.control(frame, world)
-        played = action if self._policy is None else self._policy.control(frame, world)
-        fresh = self._rng.standard_normal(LAYOUT.ctrl_size)
-        self._noise = self._correlation * self._noise + np.sqrt(1.0 - self._correlation**2) * fresh
-        ctrl: NDArray[np.float64] = played + self._spread * self._noise
-        return ctrl
+    base = base_controls(IkTracker().start(plan), qpos)
+    f1 = fill_columns(columns, base, score.roll(), plan.fingertips, plan.finger_key)
+    return Episode(score.title, f1, "ik", columns, demonstration.song_id, events=events)
 
 
 def check_policies(config: DaggerConfig) -> None:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.keyboard import KEYS
+from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.music import Score, frame_metrics
 from pianomime.players.rollout import rollout
 from pianomime.short_repr import short_repr
-from pianomime.track import Controller
+from pianomime.track import BatchController, Controller
 from pianomime.world import World
+from pianomime.world.key_sensor import NOTHING, KeyEvents
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
+from pianomime.world.touch import DEFAULT_TOUCH, TOUCHES
 from pianomime.world_names import PAPER
 
 if TYPE_CHECKING:
@@ -34,6 +36,8 @@ class Episode:
         song_id: number that episodes of one song share; -1 if unknown.
         split: part of the data set that it belongs to; only "train" is for training.
         world: name of the world in which it was played.
+        events: arrays (E,) by the names in `EVENTS`; of length 0 where keys were not sensed.
+        source: where it came from, if it is known.
     """
 
     name: str
@@ -43,8 +47,31 @@ class Episode:
     song_id: int = -1
     split: str = "train"
     world: str = PAPER
+    events: dict[str, NDArray[Any]] = field(default_factory=lambda: event_columns(NOTHING))
+    source: Source | None = None
 
     __repr__ = short_repr
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where an episode came from.
+
+    Attributes:
+        title: of the file of music.
+        digest: SHA-256 of that file, in hexadecimal digits.
+        player: name of who played it.
+        effort: how hard the player tried, 0 to 3.
+        seed: of everything that was random.
+        program: version of the program.
+    """
+
+    title: str
+    digest: str
+    player: str
+    effort: int
+    seed: int
+    program: str
 
 
 @dataclass(frozen=True)
@@ -62,6 +89,8 @@ class Column:
     description: str
 
 
+_BLOCK = 1000
+"""Frames whose base controls are computed at once: their Jacobians take some 30 MB."""
 _HANDS = "hands in the order right, left; forearm tx, ty, tz, WRJ2, WRJ1, FFJ4..1, MFJ4..1, "
 _HANDS += "RFJ4..1, LFJ5..1, THJ5..1"
 _CTRL = "right 23 then left 23 actuators: WRJ2, WRJ1, THJ5..1, FFJ4, FFJ3, FFJ0, MF and RF alike, "
@@ -91,6 +120,32 @@ COLUMNS = {
 }
 """All columns by name."""
 
+EVENTS = {
+    "event_time": Column((), "float64", "when a key began to sound or fell silent [s of episode]"),
+    "event_key": Column((), "int8", "key of the event, 0..87"),
+    "event_on": Column((), "bool", "whether the key began to sound; otherwise it fell silent"),
+    "event_velocity": Column(
+        (), "uint8", "MIDI velocity 1..127 of a key that began to sound, or 0"
+    ),
+}
+"""What keys sensed between frames, by name: one row an event, in the order of time."""
+
+
+class Recording(NamedTuple):
+    """What `record` saw.
+
+    Attributes:
+        columns: of T frames; those that `fill_columns` fills are not filled yet.
+        qpos: (T, 142) positions before each frame, as in `World.qpos` [rad, m].
+        events: arrays by the names in `EVENTS`.
+        blow_ups: number of frames in which the physics broke.
+    """
+
+    columns: dict[str, NDArray[Any]]
+    qpos: NDArray[np.float64]
+    events: dict[str, NDArray[Any]]
+    blow_ups: int
+
 
 def play_episode(run: ExpertRun) -> Episode:
     """Have the best expert of a run play its song.
@@ -107,9 +162,10 @@ def play_episode(run: ExpertRun) -> Episode:
         expert_tracker(run).start(demonstration.plan),
         base_controller(env, demonstration.plan),
     )
-    columns = record(controller, base, demonstration.score, env.world)
+    columns, qpos, events, _ = record(controller, demonstration.score, env.world)
     f1 = fill_columns(
         columns,
+        base_controls(base, qpos),
         demonstration.score.roll(),
         demonstration.plan.fingertips,
         demonstration.plan.finger_key,
@@ -122,34 +178,33 @@ def play_episode(run: ExpertRun) -> Episode:
         demonstration.song_id,
         demonstration.split,
         env.world,
+        events,
     )
 
 
 def record(
-    controller: Controller, base: Controller, score: Score, world_name: str = PAPER
-) -> dict[str, NDArray[Any]]:
-    """Play a score, and record states and controls.
+    controller: Controller, score: Score, world_name: str = PAPER, touch: str = DEFAULT_TOUCH
+) -> Recording:
+    """Play a score, and record states, controls and what keys sense.
 
     Args:
         controller: plays.
-        base: the base controller, asked for its control in every state.
         score: what is played.
         world_name: name of the world in which it is played.
-
-    Returns:
-        The columns; those that `fill_columns` fills are not filled yet.
+        touch: name of the map from the speed of a key to MIDI velocity.
 
     Raises:
         InputError: the controller gives several controls a frame, which is no action of a frame.
     """
     pedal, world = score.pedal_roll(), World(world_name, quiet=True)
-    columns = empty_columns(len(pedal))
+    columns, events = empty_columns(len(pedal)), NOTHING
+    qpos = np.empty((len(pedal), LAYOUT.qpos_size))
 
     def observe(frame: int) -> None:
+        qpos[frame] = world.qpos
         columns["joints"][frame] = world.qpos_hands
         columns["velocities"][frame] = world.qvel_hands
         columns["keys"][frame] = world.key_state
-        columns["base_control"][frame] = base.control(frame, world)
 
     observe(0)
     for step in rollout(controller, world, pedal):
@@ -161,9 +216,45 @@ def record(
             )
         columns["action"][step.frame] = step.ctrl
         columns["pressed"][step.frame] = world.pressed
+        events = events.followed_by(step.key_events.later(step.frame * FRAME_SECONDS))
         if step.frame + 1 < len(pedal):
             observe(step.frame + 1)
-    return columns
+    return Recording(columns, qpos, event_columns(events, touch), world.blow_ups)
+
+
+def base_controls(base: BatchController, qpos: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, 46) What a base controller would send in each state of an episode [rad, m].
+
+    Many at once, which is faster than frame by frame, and gives the same bit for bit.
+
+    Args:
+        base: the base controller.
+        qpos: (T, 142) positions before each frame, as in `World.qpos` [rad, m].
+    """
+    blocks = range(0, len(qpos), _BLOCK)
+    frames = np.arange(len(qpos))
+    return np.concatenate(
+        [base.controls(frames[at : at + _BLOCK], qpos[at : at + _BLOCK])[0] for at in blocks]
+    )
+
+
+def event_columns(events: KeyEvents, touch: str = DEFAULT_TOUCH) -> dict[str, NDArray[Any]]:
+    """Arrays by the names in `EVENTS`.
+
+    Args:
+        events: of a World, timed from the beginning of the episode.
+        touch: name of the map from the speed of a key to MIDI velocity.
+    """
+    # Those of one physics step stand in the order of keys.
+    order = np.argsort(events.time, kind="stable")
+    key, on, speed = events.key[order], events.on[order], events.speed[order]
+    arrays = {
+        "event_time": events.time[order],
+        "event_key": key,
+        "event_on": on,
+        "event_velocity": np.where(on, TOUCHES[touch].velocity_of(speed, key), 0),
+    }
+    return {name: arrays[name].astype(column.dtype) for name, column in EVENTS.items()}
 
 
 def empty_columns(frames: int) -> dict[str, NDArray[Any]]:
@@ -175,14 +266,16 @@ def empty_columns(frames: int) -> dict[str, NDArray[Any]]:
 
 def fill_columns(
     columns: dict[str, NDArray[Any]],
+    base_control: NDArray[np.float64],
     goal: NDArray[np.bool_],
     fingertips: NDArray[np.float64],
     finger_key: NDArray[np.int8],
 ) -> float:
-    """Fill in the plan's columns and the residual, where all others are filled.
+    """Fill in the columns of the plan and of the base controller, where all others are filled.
 
     Args:
         columns: of T frames, filled in place.
+        base_control: (T, 46) controls of the base controller [rad, m].
         goal: (T, 88) keys that should sound.
         fingertips: (T, 2, 6, 3) targets [m].
         finger_key: (T, 2, 5) the key that each finger is to press, -1 for none.
@@ -190,6 +283,7 @@ def fill_columns(
     Returns:
         The frame-wise F1 of the keys that sounded.
     """
+    columns["base_control"][:] = base_control
     columns["goal"][:] = goal
     columns["fingertips"][:] = fingertips
     columns["finger_key"][:] = finger_key

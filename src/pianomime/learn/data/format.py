@@ -8,8 +8,8 @@ from typing import Any
 from pianomime.sealed_json import read_json
 
 FORMAT = "pianomime experts"
-VERSION = 4
-"""Of the data set; version 3 had no digests."""
+VERSION = 5
+"""Of the data set; version 4 had no events."""
 
 
 def is_data_set(path: Path) -> bool:

@@ -161,10 +161,10 @@ def published_episodes(experts: Path, demonstrations: Path) -> Iterator[tuple[Ep
         columns["pressed"][:] = np.vstack([sounds[1:], sounds[-1:]])
         tips = human["fingertips"][theirs].astype(float)
         finger_key = human["finger_key"][theirs].astype(np.int8)
-        columns["base_control"][:] = _ik_controls(tips, columns["joints"])
         packed = human["goal_packed"][theirs].astype(np.uint8)
         goal = np.unpackbits(packed, axis=1)[:, :KEYS].astype(bool)
-        f1 = fill_columns(columns, goal, tips, finger_key)
+        base = _ik_controls(tips, columns["joints"])
+        f1 = fill_columns(columns, base, goal, tips, finger_key)
         name = f"clip{clip:03d}"
         row = place[clip]
         yield Episode(name, f1, "ik", columns, song[row], split[row]), len(ends)

@@ -9,8 +9,11 @@ Read it with no more than zarr:
     for first, end in zip([0, *ends], ends):
         joints, action = data["joints"][first:end], data["action"][first:end]
 
+What keys sensed between frames is in the arrays `event_*`, whose episodes end at `event_end`.
+
 The attribute `description` of every array says what it holds; the attribute `episodes` of the group
-has the name, the F1, the base controller, the song, the split and the world of each episode.
+has the name, the F1, the base controller, the song, the split, the world and the source of each
+episode.
 
 Every chunk ends with a checksum (CRC32C), which all readers of zarr compare. The attributes have a
 digest of each column of each episode, too: a chunk that is gone reads as zeros.
@@ -18,8 +21,8 @@ digest of each column of each episode, too: a chunk that is gone reads as zeros.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +33,9 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from pianomime.errors import InputError, reason_of
 from pianomime.files import new_folder
-from pianomime.learn.data.episode import COLUMNS, Column, Episode
+from pianomime.learn.data.episode import COLUMNS, EVENTS, Column, Episode, Source
 from pianomime.learn.data.format import FORMAT, VERSION, is_data_set, zarr_attributes
-from pianomime.schema import Field, ListOf, Schema, short
+from pianomime.schema import Field, ListOf, Schema, check_json, short
 from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
 from pianomime.short_repr import short_repr
@@ -41,7 +44,21 @@ from pianomime.world_names import PAPER, WORLDS
 
 _CHUNK = 4096
 """Rows in a chunk of the file."""
-_DIGESTS = {name: Field("text") for name in COLUMNS}
+_ARRAYS = {**COLUMNS, **EVENTS}
+"""All arrays of an episode by name."""
+_ENDS = {"episode_end": "ends", "event_end": "event_ends"}
+"""Arrays of where episodes end, with the attributes that say the same."""
+_DIGESTS = {name: Field("text") for name in _ARRAYS}
+_MOST_EFFORT = 3
+_SOURCE: dict[str, Schema] = {
+    "title": Field("text"),
+    "digest": Field("text"),
+    "player": Field("text"),
+    "effort": Field("int", (), 0, _MOST_EFFORT),
+    "seed": Field("int", (), 0),
+    "program": Field("text"),
+}
+"""Of a `Source`."""
 _EPISODE: dict[str, Schema] = {
     "name": Field("text"),
     "f1": Field("float", (), 0, 1),
@@ -49,6 +66,7 @@ _EPISODE: dict[str, Schema] = {
     "song_id": Field("int", (), -1),
     "split": Field("text"),
     "world": Field("text", choices=WORLDS, optional=True),
+    "source": Field("object", optional=True),
     "digests": _DIGESTS,
 }
 """What is recorded of each episode."""
@@ -56,17 +74,45 @@ _SCHEMA: dict[str, Schema] = {
     "format": Field("text", choices=(FORMAT,)),
     "version": Field("int"),
     "ends": Field("int", ("E",), 1),
+    "event_ends": Field("int", ("E",), 0),
     "episodes": ListOf(_EPISODE),
+    "settings": Field("object"),
+    "failed": ListOf({"song": Field("text"), "error": Field("text")}),
 }
-"""Attributes of the group; `ends` is what the array `episode_end` says."""
+"""Attributes of the group; `ends` is what the array `episode_end` says, `event_ends` what
+`event_end` does."""
 
 
-def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
+@dataclass(frozen=True)
+class Making:
+    """How a data set was made, as far as it tells.
+
+    Attributes:
+        settings: that decided how songs were played, for JSON; empty where nobody recorded them.
+        failed: `song` and `error` of each song that could not be played.
+    """
+
+    settings: dict[str, Any] = field(default_factory=dict)
+    failed: list[dict[str, str]] = field(default_factory=list)
+
+
+UNKNOWN_MAKING = Making()
+"""Of data sets that do not tell how they were made."""
+
+
+def write_trajectories(
+    path: Path,
+    episodes: Iterator[Episode],
+    making: Making = UNKNOWN_MAKING,
+    card: Callable[[Path], str] | None = None,
+) -> int:
     """Write episodes, all or nothing; an older data set at the same place is replaced.
 
     Args:
         path: of the data set, a folder.
         episodes: what to write, all of one world.
+        making: how they were made.
+        card: makes the text of the file `README.md` in the data set, of its path.
 
     Returns:
         Number of episodes.
@@ -80,7 +126,7 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
     # One of an earlier version, or a damaged one, is replaced as well.
     with new_folder(path, is_data_set, "a data set") as fresh:
         group = zarr.open_group(str(fresh), mode="w", zarr_format=3)
-        for name, column in COLUMNS.items():
+        for name, column in _ARRAYS.items():
             array = group.create_array(
                 name,
                 shape=(0, *column.shape),
@@ -90,14 +136,16 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
                 config={"write_empty_chunks": True},
             )
             array.attrs["description"] = column.description
-        ends = [0]
+        ends, event_ends = [0], [0]
         rows: list[Any] = []
         for episode in episodes:
             if rows:
                 check_one_world(rows[0], episode.name, episode.world)
-            for name, column in COLUMNS.items():
-                _array(group, name).append(episode.columns[name].astype(column.dtype, copy=False))
-            ends.append(ends[-1] + len(episode.columns["goal"]))
+            arrays = {**episode.columns, **episode.events}
+            for name, column in _ARRAYS.items():
+                _array(group, name).append(arrays[name].astype(column.dtype, copy=False))
+            ends.append(ends[-1] + len(arrays["goal"]))
+            event_ends.append(event_ends[-1] + len(arrays["event_key"]))
             rows.append(
                 {
                     "name": episode.name,
@@ -106,15 +154,30 @@ def write_trajectories(path: Path, episodes: Iterator[Episode]) -> int:
                     "song_id": episode.song_id,
                     "split": episode.split,
                     "world": episode.world,
-                    "digests": {name: _digest(episode.columns, name) for name in COLUMNS},
+                    "digests": {name: _digest(arrays, name) for name in _ARRAYS},
+                    **({} if episode.source is None else {"source": asdict(episode.source)}),
                 }
             )
         if not rows:
             raise InputError("there are no episodes to collect")
-        end_array = group.create_array("episode_end", data=np.array(ends[1:], np.int64))
-        end_array.attrs["description"] = "one past the last row of each episode"
-        content = {"format": FORMAT, "version": VERSION, "ends": ends[1:], "episodes": rows}
+        for name, values, rows_of in (
+            ("episode_end", ends, "row"),
+            ("event_end", event_ends, "event"),
+        ):
+            end_array = group.create_array(name, data=np.array(values[1:], np.int64))
+            end_array.attrs["description"] = f"one past the last {rows_of} of each episode"
+        content = {
+            "format": FORMAT,
+            "version": VERSION,
+            "ends": ends[1:],
+            "event_ends": event_ends[1:],
+            "episodes": rows,
+            "settings": making.settings,
+            "failed": making.failed,
+        }
         group.attrs.update(sealed(content))
+        if card is not None:
+            (fresh / "README.md").write_text(card(fresh), "utf-8")
     return len(rows)
 
 
@@ -125,12 +188,17 @@ class TrajectoryData:
     Attributes:
         group: the zarr group.
         ends: (E,) one past the last row of each episode.
-        episodes: name, f1, base, song_id, split and world of each, see `Episode`.
+        event_ends: (E,) one past the last event of each episode.
+        episodes: name, f1, base, song_id, split and world of each, and its source if that is
+            known, see `Episode`.
+        making: how it was made.
     """
 
     group: zarr.Group
     ends: NDArray[np.int64]
+    event_ends: NDArray[np.int64]
     episodes: list[dict[str, Any]]
+    making: Making
 
     __repr__ = short_repr
 
@@ -151,42 +219,52 @@ class TrajectoryData:
             )
         try:
             content = unsealed(attributes, _SCHEMA)
-            ends = np.array(content["ends"], np.int64)
-            if len(ends) != len(content["episodes"]) or (np.diff(ends, prepend=0) <= 0).any():
+            for facts in content["episodes"]:
+                if "source" in facts:
+                    check_json(facts["source"], _SOURCE, "source")
+            ends, event_ends = (np.array(content[each], np.int64) for each in _ENDS.values())
+            if not len(ends) == len(event_ends) == len(content["episodes"]):
+                raise InputError("it has more or fewer ends than episodes")
+            # An episode may be silent, but not empty.
+            if (np.diff(ends, prepend=0) <= 0).any() or (np.diff(event_ends, prepend=0) < 0).any():
                 raise InputError("its episodes do not end one after the other")
             group = zarr.open_group(str(path), mode="r", zarr_format=3)
-            for name, column in COLUMNS.items():
+            for name, column in _ARRAYS.items():
                 # Before memory is taken for what may be declared alone.
                 array = _array(group, name)
-                right = (int(ends[-1]), *column.shape), _chunks(column), np.dtype(column.dtype)
+                length = int((ends if name in COLUMNS else event_ends)[-1])
+                right = (length, *column.shape), _chunks(column), np.dtype(column.dtype)
                 if (array.shape, array.chunks, array.dtype) != right:
                     raise InputError(f"{name} has another shape, type or chunk")
-            there = _array(group, "episode_end")
-            if there.shape != ends.shape or max(there.chunks) > len(ends):
-                raise InputError("episode_end has another shape or chunk")
-            if not np.array_equal(np.asarray(there[:]), ends):
-                raise InputError("episode_end is not what the attributes say")
+            for name, each in _ENDS.items():
+                there = _array(group, name)
+                if there.shape != ends.shape or max(there.chunks) > len(ends):
+                    raise InputError(f"{name} has another shape or chunk")
+                if not np.array_equal(np.asarray(there[:]), np.array(content[each])):
+                    raise InputError(f"{name} is not what the attributes say")
         # A damaged store raises what its codecs and its metadata happen to raise.
         except Exception as error:
             raise InputError(f"{path}: damaged ({reason_of(error)})") from error
         # Data sets that do not say it were played in the paper's.
-        return cls(group, ends, [{"world": PAPER, **facts} for facts in content["episodes"]])
+        episodes = [{"world": PAPER, **facts} for facts in content["episodes"]]
+        making = Making(content["settings"], content["failed"])
+        return cls(group, ends, event_ends, episodes, making)
 
     def __len__(self) -> int:
         """Number of episodes."""
         return len(self.ends)
 
     def columns(self, number: int, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-        """Some columns of one episode, in memory.
+        """Some columns of one episode, or of its events, in memory.
 
         Raises:
             InputError: they are damaged.
         """
-        first = int(self.ends[number - 1]) if number else 0
-        rows = slice(first, int(self.ends[number]))
         columns = {}
         try:
             for name in names:
+                ends = self.ends if name in COLUMNS else self.event_ends
+                rows = slice(int(ends[number - 1]) if number else 0, int(ends[number]))
                 columns[name] = np.asarray(_array(self.group, name)[rows])
                 if _digest(columns, name) != self.episodes[number]["digests"][name]:
                     raise InputError(f"{name} of episode {number} was changed or is missing")
@@ -208,6 +286,8 @@ class TrajectoryData:
             facts["song_id"],
             facts["split"],
             facts["world"],
+            self.columns(number, EVENTS),
+            Source(**facts["source"]) if "source" in facts else None,
         )
 
 
@@ -242,4 +322,4 @@ def _chunks(column: Column) -> tuple[int, ...]:
 
 def _digest(columns: Mapping[str, NDArray[Any]], name: str) -> str:
     """The seal of one column of an episode."""
-    return seal_of({name: columns[name].astype(COLUMNS[name].dtype, copy=False)})
+    return seal_of({name: columns[name].astype(_ARRAYS[name].dtype, copy=False)})
