@@ -12,7 +12,7 @@ from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.shown import command_word, shown
 from pianomime.world_names import WorldName
 
-_TOLD = 20
+_TOLD = 15
 """Songs that failed whose reason is printed; the data set has all of them."""
 
 
