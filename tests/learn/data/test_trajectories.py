@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import zarr
 from pianomime.commands.collect import Collect
 from pianomime.errors import InputError
 from pianomime.learn.data.dataset import trajectory_dataset
-from pianomime.learn.data.episode import COLUMNS, Episode
+from pianomime.learn.data.episode import COLUMNS, EVENTS, Column, Episode, Source
 from pianomime.learn.data.format import VERSION
 from pianomime.learn.data.published import published_episodes, world_order
 from pianomime.learn.data.trajectories import TrajectoryData, write_trajectories
@@ -316,6 +317,58 @@ def test_episodes_of_different_worlds_are_refused_in_one_line(tmp_path: Path) ->
     with pytest.raises(InputError, match="a data set is of one world") as error:
         trajectory_dataset(sources)
     assert "\n" not in str(error.value)
+
+
+def random_episode(frames: int, events: int, seed: int) -> Episode:
+    rng = np.random.default_rng(seed)
+
+    def drawn(columns: Mapping[str, Column], rows: int) -> dict[str, np.ndarray]:
+        return {
+            name: rng.integers(0, 2, (rows, *column.shape)).astype(column.dtype)
+            for name, column in columns.items()
+        }
+
+    source = Source("song", "0" * 64, "somebody", 0, seed, "0.1")
+    columns, noted = drawn(COLUMNS, frames), drawn(EVENTS, events)
+    return Episode(f"{seed}", 0.5, "ik", columns, seed, "train", "paper", noted, source)
+
+
+def test_episodes_across_chunks_come_back_as_they_were(tmp_path: Path) -> None:
+    out = tmp_path / "experts.zarr"
+    # A chunk has 4096 rows: one within, one that fills it, one of several, a silent one.
+    sizes = [(3000, 5), (1096, 0), (9000, 4100), (1, 0)]
+    written = [random_episode(*size, seed) for seed, size in enumerate(sizes)]
+    write_trajectories(out, iter(written))
+    data = TrajectoryData.open(out)
+    assert np.diff(data.ends, prepend=0).tolist() == [size for size, _ in sizes]
+    assert np.diff(data.event_ends, prepend=0).tolist() == [size for _, size in sizes]
+    for number, one in enumerate(written):
+        read = data.episode(number)
+        assert (read.name, read.song_id, read.source) == (one.name, one.song_id, one.source)
+        for there, wanted in ((read.columns, one.columns), (read.events, one.events)):
+            assert list(there) == list(wanted)
+            for name, array in wanted.items():
+                np.testing.assert_array_equal(there[name], array)
+
+
+@pytest.mark.parametrize("how", ["gone", "cut", "ends", "source"])
+def test_damage_of_events_and_sources_is_one_line(tmp_path: Path, how: str) -> None:
+    out = tmp_path / "experts.zarr"
+    write_trajectories(out, iter([random_episode(4, 50, 0)]))
+    chunk = out / "event_key" / "c" / "0"
+    if how == "gone":
+        chunk.unlink()
+    elif how == "cut":
+        chunk.write_bytes(chunk.read_bytes()[: chunk.stat().st_size // 2])
+    elif how == "ends":
+        zarr.open_group(str(out)).create_array("event_end", data=np.array([49]), overwrite=True)
+    else:
+        content = zarr.open_group(str(out)).attrs.asdict()
+        del content["digest"], content["episodes"][0]["source"]["player"]
+        zarr.open_group(str(out)).attrs.put(sealed(content))
+    with pytest.raises(InputError, match="damaged") as caught:
+        TrajectoryData.open(out).episode(0)
+    assert "\n" not in str(caught.value)
 
 
 class Killed(BaseException):

@@ -126,6 +126,7 @@ def write_trajectories(
     # One of an earlier version, or a damaged one, is replaced as well.
     with new_folder(path, is_data_set, "a data set") as fresh:
         group = zarr.open_group(str(fresh), mode="w", zarr_format=3)
+        appenders = {}
         for name, column in _ARRAYS.items():
             array = group.create_array(
                 name,
@@ -136,6 +137,7 @@ def write_trajectories(
                 config={"write_empty_chunks": True},
             )
             array.attrs["description"] = column.description
+            appenders[name] = _Appender(array)
         ends, event_ends = [0], [0]
         rows: list[Any] = []
         for episode in episodes:
@@ -143,7 +145,7 @@ def write_trajectories(
                 check_one_world(rows[0], episode.name, episode.world)
             arrays = {**episode.columns, **episode.events}
             for name, column in _ARRAYS.items():
-                _array(group, name).append(arrays[name].astype(column.dtype, copy=False))
+                appenders[name].add(arrays[name].astype(column.dtype, copy=False))
             ends.append(ends[-1] + len(arrays["goal"]))
             event_ends.append(event_ends[-1] + len(arrays["event_key"]))
             rows.append(
@@ -160,6 +162,8 @@ def write_trajectories(
             )
         if not rows:
             raise InputError("there are no episodes to collect")
+        for appender in appenders.values():
+            appender.flush()
         for name, values, rows_of in (
             ("episode_end", ends, "row"),
             ("event_end", event_ends, "event"),
@@ -307,6 +311,35 @@ def check_one_world(first: Mapping[str, Any], name: str, world: str) -> None:
             f"{shown(name)} was played in the world {world}, {shown(first['name'])} in "
             f"{first['world']}: a data set is of one world"
         )
+
+
+class _Appender:
+    """Appends rows to an array by whole chunks: one that is added to is compressed anew.
+
+    Args:
+        array: without rows.
+    """
+
+    def __init__(self, array: zarr.Array[Any]) -> None:
+        self._array = array
+        self._waiting: list[NDArray[Any]] = []
+
+    def add(self, rows: NDArray[Any]) -> None:
+        """Append rows, some of which may wait for others."""
+        self._waiting.append(rows)
+        waiting = sum(map(len, self._waiting))
+        if waiting >= _CHUNK:
+            joined = np.concatenate(self._waiting)
+            whole = waiting // _CHUNK * _CHUNK
+            self._array.append(joined[:whole])
+            # A copy: what was written can be given back.
+            self._waiting = [joined[whole:].copy()]
+
+    def flush(self) -> None:
+        """Append those that wait."""
+        if self._waiting:
+            self._array.append(np.concatenate(self._waiting))
+            self._waiting = []
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
