@@ -126,6 +126,7 @@ CASES = {
     "collect-dagger": Case(
         ["collect-dagger", "{inputs}/demos", "-o", "out/dagger.zarr", "--jobs=2"], ["demos"]
     ),
+    "perform": Case(["perform", *_SONGS, "-o", "out/songs.zarr", "--jobs=2"], ["songs"]),
     "train-expert (PPO)": Case(
         ["train-expert", "{inputs}/demos/0.npz", "-o", "out", *_PPO], ["demos"]
     ),
