@@ -204,7 +204,7 @@ def test_work_that_failed_is_one_line_and_not_bad_input(
 
 
 def test_an_unknown_command_is_refused_with_a_list(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "play, report, evaluate" in fails(["perform"], capsys)
+    assert "play, report, evaluate" in fails(["juggle"], capsys)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are another thing on Windows")
