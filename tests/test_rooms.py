@@ -47,7 +47,7 @@ LEARN = (
     ("envs",),
     ("expert",),
     ("data",),
-    ("goal",),
+    ("export", "goal"),
     ("imitation",),
     ("fingers", "sac"),
 )

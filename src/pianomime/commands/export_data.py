@@ -8,7 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from pianomime.learn.data.data_export import DataFormat
+from pianomime.learn.export.data_export import DataFormat
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class ExportData:
         from pianomime.commands.extras import extra
         from pianomime.commands.needs import need_folder, need_packages
         from pianomime.commands.progress import bars
-        from pianomime.learn.data.data_export import PACKAGES, export_data
+        from pianomime.learn.export.data_export import PACKAGES, export_data
         from pianomime.progress import telling
         from pianomime.shown import shown
 

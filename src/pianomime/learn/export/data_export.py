@@ -54,20 +54,20 @@ def export_data(data: TrajectoryData, path: Path, data_format: DataFormat) -> No
     """
     world = data.episodes[0]["world"]
     if data_format == "minari":
-        from pianomime.learn.data.minari import check_minari_name
+        from pianomime.learn.export.minari import check_minari_name
 
         check_minari_name(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(path, is_data_export, "an export of a data set") as folder:
         folder.mkdir()
         if data_format == "lerobot":
-            from pianomime.learn.data.lerobot import feature_names, write_lerobot
+            from pianomime.learn.export.lerobot import feature_names, write_lerobot
 
             numbers = feature_names(world)
             write_lerobot(data, folder)
         else:
-            from pianomime.learn.data.minari import write_minari
-            from pianomime.learn.data.named_rows import names
+            from pianomime.learn.export.minari import write_minari
+            from pianomime.learn.export.named_rows import names
 
             numbers = names(world)
             write_minari(data, folder, path.name)

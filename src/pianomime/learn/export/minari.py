@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
-from pianomime.learn.data.named_rows import COLUMNS_READ, rows
 from pianomime.learn.data.trajectories import TrajectoryData
+from pianomime.learn.export.named_rows import COLUMNS_READ, rows
 from pianomime.music import frame_metrics
 from pianomime.progress import Steps
 from pianomime.shown import shown

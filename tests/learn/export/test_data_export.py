@@ -13,11 +13,11 @@ import pytest
 
 from pianomime.cli import main
 from pianomime.errors import InputError
-from pianomime.learn.data.data_export import MARK, DataFormat, export_data
 from pianomime.learn.data.episode import COLUMNS, Episode
-from pianomime.learn.data.feature_stats import RunningStats, episode_stats
-from pianomime.learn.data.named_rows import GOAL_FRAMES, names, rows
 from pianomime.learn.data.trajectories import TrajectoryData, write_trajectories
+from pianomime.learn.export.data_export import MARK, DataFormat, export_data
+from pianomime.learn.export.feature_stats import RunningStats, episode_stats
+from pianomime.learn.export.named_rows import GOAL_FRAMES, names, rows
 from pianomime.world import World
 from pianomime.world_names import PAPER, WORLDS
 
@@ -156,8 +156,8 @@ def test_files_and_chunks_are_begun_where_one_is_full(
     data: TrajectoryData, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pq = pytest.importorskip("pyarrow.parquet", reason="the extra data is not installed")
-    monkeypatch.setattr("pianomime.learn.data.lerobot._FILE_MIB", 1e-6)
-    monkeypatch.setattr("pianomime.learn.data.lerobot.FILES_IN_CHUNK", 2)
+    monkeypatch.setattr("pianomime.learn.export.lerobot._FILE_MIB", 1e-6)
+    monkeypatch.setattr("pianomime.learn.export.lerobot.FILES_IN_CHUNK", 2)
     export_data(data, tmp_path / "out", "lerobot")
     for kind in ("data", "meta/episodes"):
         files = sorted((tmp_path / "out" / kind).rglob("*.parquet"))

@@ -23,9 +23,9 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE
-from pianomime.learn.data.feature_stats import QUANTILES, RunningStats, episode_stats
-from pianomime.learn.data.named_rows import COLUMNS_READ, names, rows
 from pianomime.learn.data.trajectories import TrajectoryData
+from pianomime.learn.export.feature_stats import QUANTILES, RunningStats, episode_stats
+from pianomime.learn.export.named_rows import COLUMNS_READ, names, rows
 from pianomime.progress import Steps
 
 VERSION = "v3.0"

@@ -1,0 +1,1 @@
+"""Exports of data sets for other libraries."""
