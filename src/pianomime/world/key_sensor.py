@@ -101,20 +101,22 @@ def sense(
     before, after = angle[:-1], angle[1:]
     goes_on = (after >= on_angle) & (before < on_angle)
     goes_off = (after <= off_angle) & (before > off_angle)
-    crossings = np.argwhere((goes_on | goes_off).transpose(1, 2, 0))
-    events: list[tuple[int, int, bool, float, float]] = []
-    for world, key, step in crossings.tolist():
-        on = bool(goes_on[step, world, key])
-        if on == sounding[world, key]:
-            continue
-        sounding[world, key] = on
-        threshold = on_angle[key] if on else off_angle[key]
-        first, last = before[step, world, key], after[step, world, key]
-        share = float((threshold - first) / (last - first))
-        pair = velocity[step : step + 2, world, key]
-        turning = float(pair.max() if on else pair.min())
-        events.append((world, key, on, (step + share) * PHYSICS_DT, turning * key_levers()[key]))
-    return as_events(events)
+    world, key, step = np.nonzero((goes_on | goes_off).transpose(1, 2, 0))
+    if not len(key):
+        return NOTHING
+    on = goes_on[step, world, key]
+    # A crossing is an event unless it leads to where the key is since the last one.
+    same_key = (world[1:] == world[:-1]) & (key[1:] == key[:-1])
+    first, last = np.append(True, ~same_key), np.append(~same_key, True)
+    was_on = np.where(first, sounding[world, key], np.append(False, on[:-1]))
+    sounding[world[last], key[last]] = on[last]
+    changes = on != was_on
+    world, key, step, on = world[changes], key[changes], step[changes], on[changes]
+    start, end = before[step, world, key], after[step, world, key]
+    share = (np.where(on, on_angle[key], off_angle[key]) - start) / (end - start)
+    earlier, later = velocity[step, world, key], velocity[step + 1, world, key]
+    turning = np.where(on, np.maximum(earlier, later), np.minimum(earlier, later))
+    return KeyEvents(world, key, on, (step + share) * PHYSICS_DT, turning * key_levers()[key])
 
 
 def as_events(events: list[tuple[int, int, bool, float, float]]) -> KeyEvents:
