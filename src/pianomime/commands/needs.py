@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pianomime.commands.extras import extra
+from pianomime.device_names import CPU
 from pianomime.errors import InputError
 from pianomime.learn.data.format import is_data_set, training_songs, zarr_attributes
 from pianomime.learn.goal.config import RESULT
@@ -34,6 +35,8 @@ TRAIN = (
 """The packages of the extra "train"."""
 RAY = ("ray",)
 """What the extra "scale" adds to them."""
+GPU = ("mujoco_warp", "warp")
+"""The packages of the extra "gpu"."""
 
 _MAKES_DATA = "`pianomime collect-dagger DEMOS -o DATA` makes a data set of demonstrations"
 _MAKES_DEMOS = (
@@ -56,6 +59,19 @@ def need_packages(name: str, packages: Iterable[str] = TRAIN) -> None:
         for package in packages:
             if find_spec(package) is None:
                 raise ModuleNotFoundError(f"No module named {package!r}", name=package)
+
+
+def need_device(device: str) -> None:
+    """Refuse to begin where what steps worlds on a device is not installed.
+
+    Args:
+        device: one of `DEVICES`.
+
+    Raises:
+        InputError: a package is missing; the message says how to install it.
+    """
+    if device != CPU:
+        need_packages("gpu", GPU)
 
 
 def need_songs(folders: Sequence[Path], least: int = 1) -> None:

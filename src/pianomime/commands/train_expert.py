@@ -63,11 +63,12 @@ class TrainExpert:
             InputError: the song or the folder cannot be used.
             OSError: a file cannot be read or written.
         """
-        from pianomime.commands.needs import need_folder, need_packages, need_piece
+        from pianomime.commands.needs import need_device, need_folder, need_packages, need_piece
         from pianomime.commands.progress import bars
 
         out = self.out or Path("out", f"expert-{file_name(Path(self.song).stem)}-{self.preset}")
         need_packages("train")
+        need_device(self.config.env.device)
         need_piece(self.song)
         need_folder(out)
         with extra("train"), bars() as progress:

@@ -68,7 +68,7 @@ class TrainExperts:
             InputError: there are no songs, or the folder or the cluster cannot be used.
             OSError: a file cannot be read or written.
         """
-        from pianomime.commands.needs import RAY, need_folder, need_packages
+        from pianomime.commands.needs import RAY, need_device, need_folder, need_packages
         from pianomime.commands.progress import bars
         from pianomime.validation import within
 
@@ -79,6 +79,7 @@ class TrainExperts:
             "out", f"experts-{file_name(self.folder.resolve().name)}-{self.preset}"
         )
         need_packages("train")
+        need_device(self.config.env.device)
         if self.ray is not None:
             need_packages("scale", RAY)
         if not self.folder.is_dir():

@@ -38,6 +38,11 @@ from pianomime.learn.envs.config import (
             "env.episode.start must be one of beginning, anywhere, not 'end'",
         ),
         (EnvConfig, {"world": "moon"}, "env.world must be one of paper, solid, not 'moon'"),
+        (
+            EnvConfig,
+            {"device": "gpu"},
+            "env.device must be one of cpu, cuda, warp-cpu, not 'gpu'",
+        ),
         (EnvConfig, {"base": "pid"}, "env.base must be one of ik, dynamic, not 'pid'"),
     ],
 )

@@ -32,7 +32,8 @@ from pianomime.plan.demonstration import Demonstration
 from pianomime.players.rollout import rollout
 from pianomime.short_repr import short_repr
 from pianomime.track import BatchController, BatchTracker, DynamicTracker, IkTracker
-from pianomime.world import World, WorldBatch
+from pianomime.world import World
+from pianomime.world.device_batch import device_batch
 from pianomime.world.layout import LAYOUT
 
 
@@ -98,7 +99,7 @@ class SongBatch:
         observation_terms: the config's if None.
 
     Raises:
-        InputError: two terms have the same name.
+        InputError: two terms have the same name, or the config's device cannot be used here.
     """
 
     def __init__(
@@ -112,7 +113,9 @@ class SongBatch:
     ) -> None:
         self.demonstration, self.config = demonstration, config
         self._reference = Reference.of(demonstration)
-        self._worlds = WorldBatch(num_envs, threads, quiet=True, model=config.world)
+        self._worlds = device_batch(
+            num_envs, config.device, threads, quiet=True, model=config.world
+        )
         self._base = base_controller(config, demonstration.plan)
         self.reward_terms = check_reward_terms(
             default_reward_terms(config.reward) if reward_terms is None else reward_terms

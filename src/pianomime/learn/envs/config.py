@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from pianomime.device_names import CPU, DEVICES, DeviceName
 from pianomime.errors import InputError, unknown_name
 from pianomime.learn.runs.config_json import ADDED
 from pianomime.validation import one_of, whole_numbers, within
@@ -103,6 +104,8 @@ class EnvConfig:
     world: WorldName = field(default=PAPER, metadata={ADDED: True})
     """The world in which it is played: the paper's, or one in which hands are solid and what moves
     them has limits."""
+    device: DeviceName = field(default=CPU, metadata={ADDED: True})
+    """What steps the worlds: the cores, or a GPU of NVIDIA (the extra gpu)."""
     base: Literal["ik", "dynamic"] = "ik"
     """Base controller that the residual is added to: the paper's inverse kinematics, or the
     dynamic tracker of `zero-shot-20hz`."""
@@ -113,6 +116,7 @@ class EnvConfig:
 
     def __post_init__(self) -> None:
         one_of("env.world", self.world, WORLDS)
+        one_of("env.device", self.device, DEVICES)
         one_of("env.base", self.base, ("ik", "dynamic"))
 
 

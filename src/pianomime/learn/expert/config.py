@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from pianomime.device_names import CPU
 from pianomime.errors import InputError, unknown_name
 from pianomime.learn.envs.config import ENV_PRESETS, EnvConfig
 from pianomime.validation import above_zero, one_of, whole_numbers, widths, within
@@ -129,6 +130,9 @@ class ExpertConfig:
         one_of("method", self.method, ("ppo", "search"))
         within("total_steps", self.total_steps, 1)
         within("seed", self.seed, 0)
+        if self.method == "search" and self.env.device != CPU:
+            # Its steps have to be those of the world in which it plays, bit for bit.
+            raise InputError(f"env.device {self.env.device} needs method ppo: a search is on {CPU}")
 
 
 _PAPER = ExpertConfig(env=ENV_PRESETS["paper"])
