@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pianomime.commands.extras import extra
-from pianomime.device_names import CPU
+from pianomime.device_names import CPU, DeviceName
 from pianomime.errors import InputError
 from pianomime.learn.data.format import is_data_set, training_songs, zarr_attributes
 from pianomime.learn.goal.config import RESULT
@@ -61,17 +61,21 @@ def need_packages(name: str, packages: Iterable[str] = TRAIN) -> None:
                 raise ModuleNotFoundError(f"No module named {package!r}", name=package)
 
 
-def need_device(device: str) -> None:
-    """Refuse to begin where what steps worlds on a device is not installed.
+def need_device(device: DeviceName) -> None:
+    """Refuse to begin where worlds cannot be stepped on a device.
 
     Args:
         device: one of `DEVICES`.
 
     Raises:
-        InputError: a package is missing; the message says how to install it.
+        InputError: a package is missing, and the message says how to install it; or there is no
+            such device.
     """
     if device != CPU:
         need_packages("gpu", GPU)
+        from pianomime.world.warp_batch import warp_device
+
+        warp_device(device)
 
 
 def need_songs(folders: Sequence[Path], least: int = 1) -> None:

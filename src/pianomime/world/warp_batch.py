@@ -77,7 +77,7 @@ class WarpBatch(WorldBatchBase):
             raise ValueError(f"cannot make {worlds} worlds")
         super().__init__(worlds, quiet, model)
         self.device = device
-        self._on = _warp_device(device)
+        self._on = warp_device(device)
         self._seen: dict[str, NDArray[np.float64]] = {}
         self._graphs: dict[int, Any] = {}
         with warp.ScopedDevice(self._on):
@@ -241,15 +241,21 @@ class WarpBatch(WorldBatchBase):
         return self._seen[name]
 
 
-def _warp_device(device: DeviceName) -> Any:
+def warp_device(device: DeviceName) -> Any:
     """Warp's device of a name.
+
+    Args:
+        device: "cuda" or "warp-cpu".
 
     Raises:
         InputError: there is no GPU that Warp can use.
     """
-    # Warp would print a line for each of a hundred modules that it loads.
-    warp.config.log_level = max(warp.config.log_level, warp.LOG_WARNING)
+    level = warp.config.log_level
+    # That there is no driver is said below.
+    warp.config.log_level = warp.LOG_ERROR
     warp.init()
+    # Warp would print a line for each of a hundred modules that it loads.
+    warp.config.log_level = max(level, warp.LOG_WARNING)
     if device == CUDA and not warp.is_cuda_available():
         raise InputError("the device cuda needs a GPU of NVIDIA with its driver; there is none")
     return warp.get_device("cuda:0" if device == CUDA else "cpu")

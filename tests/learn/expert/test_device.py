@@ -75,3 +75,18 @@ def test_a_missing_package_is_told_before_any_work(
     assert "[gpu]" in told
     assert "Traceback" not in told
     assert not out.exists()
+
+
+def test_a_missing_gpu_is_told_before_any_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco_warp", reason="the extra gpu is not installed")
+    warp = pytest.importorskip("warp")
+    if warp.is_cuda_available():
+        pytest.skip("there is a GPU")
+    out = tmp_path / "run"
+    with pytest.raises(SystemExit) as ended:
+        main(["train-expert", "ode-to-joy", "-o", str(out), "--env.device", "cuda"])
+    assert ended.value.code == 2
+    assert "needs a GPU of NVIDIA" in capsys.readouterr().err
+    assert not out.exists()
