@@ -25,7 +25,10 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_help_is_there_and_cheap() -> None:
-    heavy = ("numpy", "mujoco", "matplotlib", "torch", "rich", "pianomime.players.player")
+    heavy = (
+        *("numpy", "mujoco", "warp", "mujoco_warp", "matplotlib", "torch", "rich"),
+        "pianomime.players.player",
+    )
     script = (
         "import sys, pianomime.cli as cli\n"
         "try: cli.main(['--help'])\n"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -255,6 +258,47 @@ def test_a_missing_package_names_its_extra(
     with pytest.raises(InputError, match=r"needs the package warp: .*install.*\[gpu\]") as refused:
         device_batch(1, device)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("package", "text"),
+    [
+        ("warp", "raise RuntimeError('no shared\\nlibrary')"),
+        ("mujoco_warp", "from mujoco_warp import what_is_not_there"),
+        ("mujoco_warp", "of which only a part is"),
+    ],
+)
+def test_a_damaged_package_is_told_in_one_line(package: str, text: str, tmp_path: Path) -> None:
+    """In a Python of its own, since modules are imported once."""
+    for name in ("warp", "mujoco_warp"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text(text if name == package else "")
+    script = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"
+        "from pianomime.errors import InputError\n"
+        "from pianomime.world.device_batch import device_batch\n"
+        "try: device_batch(1, 'warp-cpu')\n"
+        "except InputError as refused: print(refused)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    (line,) = done.stdout.splitlines()
+    assert "the device warp-cpu cannot be used: " in line
+    assert "[gpu]' --force-reinstall" in line
+
+
+def test_without_it_warp_is_not_imported() -> None:
+    script = (
+        "import sys, pianomime, pianomime.learn.envs.batch\n"
+        "from pianomime.world.device_batch import device_batch\n"
+        "device_batch(1, threads=1)\n"
+        "print([name for name in ('warp', 'mujoco_warp') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
 
 
 def test_devices_by_name() -> None:

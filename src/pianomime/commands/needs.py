@@ -14,7 +14,6 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pianomime.commands.extras import extra
-from pianomime.device_names import CPU, DeviceName
 from pianomime.errors import InputError
 from pianomime.learn.data.format import is_data_set, training_songs, zarr_attributes
 from pianomime.learn.goal.config import RESULT
@@ -35,8 +34,6 @@ TRAIN = (
 """The packages of the extra "train"."""
 RAY = ("ray",)
 """What the extra "scale" adds to them."""
-GPU = ("mujoco_warp", "warp")
-"""The packages of the extra "gpu"."""
 
 _MAKES_DATA = "`pianomime collect-dagger DEMOS -o DATA` makes a data set of demonstrations"
 _MAKES_DEMOS = (
@@ -59,23 +56,6 @@ def need_packages(name: str, packages: Iterable[str] = TRAIN) -> None:
         for package in packages:
             if find_spec(package) is None:
                 raise ModuleNotFoundError(f"No module named {package!r}", name=package)
-
-
-def need_device(device: DeviceName) -> None:
-    """Refuse to begin where worlds cannot be stepped on a device.
-
-    Args:
-        device: one of `DEVICES`.
-
-    Raises:
-        InputError: a package is missing, and the message says how to install it; or there is no
-            such device.
-    """
-    if device != CPU:
-        need_packages("gpu", GPU)
-        from pianomime.world.warp_batch import warp_device
-
-        warp_device(device)
 
 
 def need_songs(folders: Sequence[Path], least: int = 1) -> None:

@@ -60,17 +60,18 @@ class TrainExpert:
         """Train.
 
         Raises:
-            InputError: the song or the folder cannot be used.
+            InputError: the song, the folder or the device cannot be used.
             OSError: a file cannot be read or written.
         """
-        from pianomime.commands.needs import need_device, need_folder, need_packages, need_piece
+        from pianomime.commands.needs import need_folder, need_packages, need_piece
         from pianomime.commands.progress import bars
+        from pianomime.world.device_batch import check_device
 
         out = self.out or Path("out", f"expert-{file_name(Path(self.song).stem)}-{self.preset}")
         need_packages("train")
-        need_device(self.config.env.device)
         need_piece(self.song)
         need_folder(out)
+        check_device(self.config.env.device)
         with extra("train"), bars() as progress:
             progress("loading", 0, 0)
             from pianomime.learn.expert.expert import train_expert

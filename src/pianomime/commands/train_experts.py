@@ -65,12 +65,13 @@ class TrainExperts:
         """Train and print.
 
         Raises:
-            InputError: there are no songs, or the folder or the cluster cannot be used.
+            InputError: there are no songs, or the folder, the device or the cluster cannot be used.
             OSError: a file cannot be read or written.
         """
-        from pianomime.commands.needs import RAY, need_device, need_folder, need_packages
+        from pianomime.commands.needs import RAY, need_folder, need_packages
         from pianomime.commands.progress import bars
         from pianomime.validation import within
+        from pianomime.world.device_batch import check_device
 
         if self.jobs is not None:
             within("jobs", self.jobs, 1)
@@ -79,12 +80,12 @@ class TrainExperts:
             "out", f"experts-{file_name(self.folder.resolve().name)}-{self.preset}"
         )
         need_packages("train")
-        need_device(self.config.env.device)
         if self.ray is not None:
             need_packages("scale", RAY)
         if not self.folder.is_dir():
             raise InputError(f"{self.folder}: is not a folder; one song: `pianomime train-expert`")
         need_folder(out)
+        check_device(self.config.env.device)
         with extra("train" if self.ray is None else "scale"), bars() as progress:
             progress("loading", 0, 0)
             from pianomime.learn.expert.many import experts_table, train_experts

@@ -9,6 +9,7 @@ import mujoco
 from pianomime.device_names import CPU, DEVICES, DeviceName
 from pianomime.errors import InputError, unknown_name
 from pianomime.installation import install_command
+from pianomime.shown import shown
 from pianomime.world.batch import WorldBatch
 from pianomime.world.batch_base import WorldBatchBase
 from pianomime.world_names import PAPER
@@ -34,8 +35,7 @@ def device_batch(
         model: name of the world, or its model, as of `world_model`.
 
     Raises:
-        InputError: there is no such world or no such device here, or a package is missing; the
-            message says which extra has it.
+        InputError: there is no such world, or the device cannot be used (see `check_device`).
         ValueError: there are no worlds, or a negative number of threads.
     """
     check_device(device)
@@ -47,19 +47,35 @@ def device_batch(
 
 
 def check_device(device: str) -> None:
-    """Refuse a device whose packages are not installed; none is imported.
+    """Refuse a device that cannot step worlds here.
+
+    All but "cpu" import what the extra "gpu" installs, which takes some seconds.
 
     Args:
         device: one of `DEVICES`.
 
     Raises:
-        InputError: there is no device of that name, or a package is missing; the message says
-            which extra has it.
+        InputError: there is no device of that name, or none such in this machine; or its packages
+            are missing or damaged, and the message says how to install them.
     """
     if device not in DEVICES:
         raise unknown_name("device", device, DEVICES)
-    for package in _PACKAGES if device != CPU else ():
+    if device == CPU:
+        return
+    for package in _PACKAGES:
         if find_spec(package) is None:
             raise InputError(
                 f"the device {device} needs the package {package}: {install_command('gpu')}"
             )
+    try:
+        from pianomime.world.warp_batch import warp_device
+
+        warp_device(device)
+    except InputError:
+        raise
+    except Exception as damage:
+        # Packages of which a part is missing, as after an interrupted installation, raise anything.
+        raise InputError(
+            f"the device {device} cannot be used: {type(damage).__name__}: {shown(damage)}. If a "
+            f"package is damaged: {install_command('gpu')} --force-reinstall"
+        ) from damage
