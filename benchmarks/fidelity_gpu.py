@@ -6,11 +6,12 @@ three batches with a world for each clip: the world as it is, in MuJoCo; MuJoCo 
 that Warp simulates (`world.warp_physics`), which separates what these change from what Warp does;
 and Warp.
 
-Measured are F1 of the keys pressed, blow-ups, how far the joints of the hands are from those of
-MuJoCo after some control steps, and the key-frames, of those that are pressed in either, in which
-they differ. All clips on a GPU:
+Measured are precision, recall and F1 of the keys pressed, blow-ups, how far the joints of the hands
+are from those of MuJoCo after some control steps, and the key-frames, of those that are pressed in
+either, in which they differ. All clips on a GPU, and in MuJoCo alone:
 
     python benchmarks/fidelity_gpu.py --device cuda
+    python benchmarks/fidelity_gpu.py --device cpu
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 import common
 from fidelity import Clip, clips
-from pianomime.device_names import DEVICES
+from pianomime.device_names import CPU, DEVICES
 from pianomime.music import frame_metrics
 from pianomime.world.batch_base import WorldBatchBase
 from pianomime.world.device_batch import check_device, device_batch
@@ -58,7 +59,7 @@ def replay(
 
 def main() -> None:
     options = common.parser("fidelity_gpu", __doc__)
-    options.add_argument("--device", choices=DEVICES[1:], default="cuda")
+    options.add_argument("--device", choices=DEVICES, default="cuda")
     options.add_argument("--every", type=int, default=1, help="take every so many clips")
     arguments = options.parse_args()
     check_device(arguments.device)
@@ -69,24 +70,30 @@ def main() -> None:
     batches = {
         "MuJoCo, the world": device_batch(len(played), quiet=True),
         "MuJoCo, options of Warp": device_batch(len(played), quiet=True, model=warp_physics(model)),
-        f"Warp, {arguments.device}": device_batch(len(played), arguments.device, quiet=True),
     }
+    if arguments.device != CPU:
+        batches[f"Warp, {arguments.device}"] = device_batch(
+            len(played), arguments.device, quiet=True
+        )
     runs = {name: replay(batch, controls) for name, batch in batches.items()}
     print(f"{len(played)} clips, {sum(len(clip.ctrl) for clip in played)} control steps")
     results = {}
     for name, (pressed, joints, seconds) in runs.items():
-        f1 = [
-            frame_metrics(clip.goal, pressed[: len(clip.ctrl), world]).f1
+        metrics = [
+            frame_metrics(clip.goal, pressed[: len(clip.ctrl), world])
             for world, clip in enumerate(played)
         ]
         row = {
-            "f1": float(np.mean(f1)),
-            "worst_f1": float(np.min(f1)),
+            "f1": float(np.mean([one.f1 for one in metrics])),
+            "worst_f1": min(one.f1 for one in metrics),
+            "precision": float(np.mean([one.precision for one in metrics])),
+            "recall": float(np.mean([one.recall for one in metrics])),
             "blow_ups": int(batches[name].blow_ups.sum()),
             "seconds": seconds,
         }
         print(
             f"\n{name}: replay F1 {row['f1']:.4f} (worst {row['worst_f1']:.3f}), "
+            f"precision {row['precision']:.4f}, recall {row['recall']:.4f}, "
             f"blow-ups {row['blow_ups']}, {seconds:.0f} s"
         )
         for other, (theirs, their_joints, _) in runs.items():

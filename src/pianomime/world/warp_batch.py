@@ -28,11 +28,11 @@ from pianomime.world.warp_physics import sparse_for_warp
 from pianomime.world_names import PAPER
 
 _CONSTRAINTS = 384
-"""Rows of constraints that a world has room for: half as many again as the most that random
-controls gave in the solid world, 253 (`benchmarks/speed_gpu.py` prints how many are used)."""
+"""Rows of constraints that a world has room for: nearly twice the most that random controls gave
+in the solid world, 208 (`benchmarks/memory_gpu.py` prints how many are used)."""
 _CONTACTS = 128
 """Pairs of geometries near each other, and contacts, that there is room for in a world, on average
-of all worlds: five times what random controls gave in the solid world, 25."""
+of all worlds: five times the most that random controls gave in the solid world, 24."""
 _LOST = int(
     mujoco_warp.OverflowType.NEFC
     | mujoco_warp.OverflowType.NJMAX_NNZ
