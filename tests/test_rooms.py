@@ -49,7 +49,7 @@ LEARN = (
     ("data",),
     ("export", "goal"),
     ("imitation",),
-    ("fingers", "sac"),
+    ("fingers", "sac", "three_stage"),
 )
 VIDEO = (
     ("film",),

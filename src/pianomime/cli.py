@@ -122,6 +122,12 @@ COMMANDS = {
     "train": Command(
         "pianomime.commands.train", "Train", "train a policy that plays every song", goes_on=True
     ),
+    "train-stage": Command(
+        "pianomime.commands.train_stage",
+        "TrainStage",
+        "train a stage of the player three-stage",
+        goes_on=True,
+    ),
     "train-fingers": Command(
         "pianomime.commands.train_fingers",
         "TrainFingers",

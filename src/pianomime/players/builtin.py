@@ -14,7 +14,7 @@ from pianomime.plan.demonstration import (
     DemonstrationPlanner,
 )
 from pianomime.plan.fingering_cost import FingeringConfig
-from pianomime.players.generalist import GeneralistPlayer
+from pianomime.players.generalist import GeneralistPlayer, ThreeStagePlayer
 from pianomime.players.player import PlannedPlayer, Player
 from pianomime.players.receding_horizon import HorizonConfig, RecedingHorizonPlayer
 from pianomime.players.settings import PlayerFactory, configure
@@ -22,8 +22,10 @@ from pianomime.policies.methods import (
     FINGERS,
     GENERALISTS,
     SAMPLERS,
+    THREE_STAGE,
     load_finger_tracker,
     load_policy_tracker,
+    load_stages,
     weight_files,
 )
 from pianomime.policies.network_file import load_policy
@@ -129,6 +131,17 @@ def _fingers(
     return PlannedPlayer(FINGERS, ZeroShotPlanner(planner), controls, effort, world=world)
 
 
+def _three_stage(
+    effort: int,
+    seed: int,
+    weights: str | Path | None = None,
+    world: str = PAPER,
+    **settings: Any,
+) -> Player:
+    configure(settings)
+    return ThreeStagePlayer(THREE_STAGE, load_stages(weights), effort, world)
+
+
 def _demonstration(
     effort: int,
     seed: int,
@@ -189,6 +202,7 @@ FACTORIES: dict[str, PlayerFactory] = {
     ZERO_SHOT_20HZ: _zero_shot_20hz,
     "zero-shot-ik": _zero_shot_ik,
     FINGERS: _fingers,
+    THREE_STAGE: _three_stage,
     **{method: _generalist(method) for method in GENERALISTS},
     "demonstration": _demonstration,
     "demonstration-ik": _demonstration_ik,

@@ -1,4 +1,4 @@
-"""The player of one or two learned policies that plan while they play."""
+"""The players of learned policies that plan while they play."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pianomime.players.player import Player
 from pianomime.policies.generalist import OneStageController, TwoStageController
 from pianomime.policies.policy import Policy
 from pianomime.policies.policy_tracker import PolicyTracker
+from pianomime.policies.three_stage.controller import Stages, ThreeStageController
 from pianomime.short_repr import short_repr
 from pianomime.track import Controller
 from pianomime.world_names import PAPER
@@ -42,3 +43,27 @@ class GeneralistPlayer(Player):
         if self.high is None:
             return OneStageController(score, self.low)
         return TwoStageController(score, self.high, self.low, self.seed)
+
+
+@dataclass(frozen=True)
+class ThreeStagePlayer(Player):
+    """Plays any score with policies that say fingers, fingertips and controls, closed loop.
+
+    Attributes:
+        name: what reports call it.
+        stages: the policies.
+        effort: of no effect: nothing is sampled, nothing searched for.
+        world: see `Player`; the policies were trained in the paper's.
+    """
+
+    name: str
+    stages: Stages
+    effort: int = 0
+    world: str = PAPER
+
+    def __repr__(self) -> str:
+        return short_repr(self, repr(self.name))
+
+    def start(self, score: Score) -> Controller:
+        """Everything happens frame by frame."""
+        return ThreeStageController(score, self.stages)

@@ -6,6 +6,8 @@ of the goal is assigned to the nearest finger, and that fingertip is moved onto 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
@@ -64,19 +66,30 @@ def assign_fingers(
         for row, column in zip(rows, columns, strict=True):
             if distance[row, column] <= _MAX_DISTANCE:
                 finger_key.reshape(-1)[free[row]] = keys[column]
-    assigned = flat_heights(points, finger_key)
+    assigned = onto_keys(flat_heights(points, finger_key), finger_key)
+    return assigned, finger_key
+
+
+def onto_keys(points: NDArray[np.float64], finger_key: NDArray[np.int8]) -> NDArray[np.float64]:
+    """Points whose pressing fingertips are over the middle of their keys, and not off their ends.
+
+    Args:
+        points: (2, 6, 3) wrists and fingertips, world frame [m].
+        finger_key: (2, 5) the key that each finger presses, -1 for none.
+    """
+    moved, centres = points.copy(), key_centres()
     hand, finger = np.nonzero(finger_key >= 0)
     key = finger_key[hand, finger]
-    assigned[hand, finger + 1, 1] = centres[key, 1]
+    moved[hand, finger + 1, 1] = centres[key, 1]
     far, near = (
         centres[key, 0] + side * (key_half_sizes()[key, 0] - _END_MARGIN) for side in (-1.0, 1.0)
     )
     far = np.where(BLACK[key], far, _WHITE_MIN_X)
-    assigned[hand, finger + 1, 0] = np.clip(assigned[hand, finger + 1, 0], far, near)
-    return assigned, finger_key
+    moved[hand, finger + 1, 0] = np.clip(moved[hand, finger + 1, 0], far, near)
+    return moved
 
 
-def flat_heights(points: NDArray[np.float64], finger_key: NDArray[np.int8]) -> NDArray[np.float64]:
+def flat_heights(points: NDArray[Any], finger_key: NDArray[np.int8]) -> NDArray[Any]:
     """Points with z that tells which fingers press (paper, appendix A, step 4).
 
     Args:
@@ -84,7 +97,8 @@ def flat_heights(points: NDArray[np.float64], finger_key: NDArray[np.int8]) -> N
         finger_key: (..., 2, 5) the key that each finger presses, -1 for none.
 
     Returns:
-        The points (..., 2, 6, 3), at z = 0 where they press and at hover height where not.
+        The points (..., 2, 6, 3), of the same precision, at z = 0 where they press and at hover
+        height where not.
     """
     flat = points.copy()
     flat[..., 2] = HOVER_HEIGHT

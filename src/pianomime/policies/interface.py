@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from pianomime.keyboard import KEYS
-from pianomime.policies.finger_residual import ACTIONS, SIZE
+from pianomime.policies import finger_residual
 from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
+from pianomime.policies.three_stage import fingering, hand_controls, hand_motion
 from pianomime.world.layout import LAYOUT, POINTS_SIZE
 
 if TYPE_CHECKING:
@@ -19,15 +20,26 @@ ACTION_SIZES = {
     "high": POINTS_SIZE,
     "low": LAYOUT.ctrl_size,
     "end-to-end": LAYOUT.ctrl_size,
-    "finger": ACTIONS,
+    "finger": finger_residual.ACTIONS,
+    "fingering": fingering.CHOICES,
+    "hand-motion": hand_motion.PLANE,
+    "hand-controls": hand_controls.ACTIONS,
 }
 """Numbers of the action for one frame, by level."""
+
+_OBSERVATIONS = {
+    "finger": finger_residual.SIZE,
+    "fingering": fingering.SIZE,
+    "hand-motion": hand_motion.SIZE,
+    "hand-controls": hand_controls.SIZE,
+}
+"""Numbers of an observation, where that is all there is."""
 
 
 def inputs_of(info: PolicyInfo) -> Shapes:
     """What the network of a policy is called with."""
-    if info.level == "finger":
-        return {"observation": (SIZE,)}
+    if info.level in _OBSERVATIONS:
+        return {"observation": (_OBSERVATIONS[info.level],)}
     high = info.level == "high"
     inputs: Shapes = {"goal": (GOAL_HORIZON if high else CHUNK, KEYS)}
     if info.level == "low":

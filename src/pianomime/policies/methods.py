@@ -11,6 +11,7 @@ from pianomime.policies.finger_residual import FingerResidualTracker
 from pianomime.policies.network_file import load_network, load_policy
 from pianomime.policies.policy_tracker import PolicyTracker
 from pianomime.policies.sampler import Sampler
+from pianomime.policies.three_stage.controller import Stages
 from pianomime.track import DynamicTracker
 from pianomime.world_names import PAPER
 
@@ -30,7 +31,17 @@ straight to controls (paper, appendix G)."""
 FINGERS = "fingers"
 """The player with the finger residual, and its policy."""
 
-METHODS: dict[str, tuple[str, ...]] = {FINGERS: (FINGERS,), **GENERALISTS}
+THREE_STAGE = "three-stage"
+"""The player that says fingers before it says places."""
+
+STAGES = ("fingering", "hand-motion", "hand-controls")
+"""Its policies, in order."""
+
+METHODS: dict[str, tuple[str, ...]] = {
+    FINGERS: (FINGERS,),
+    THREE_STAGE: STAGES,
+    **GENERALISTS,
+}
 """The policies of every learned player."""
 
 WEIGHTS = "PIANOMIME_WEIGHTS"
@@ -39,7 +50,11 @@ WEIGHTS = "PIANOMIME_WEIGHTS"
 SAMPLERS = (Sampler(2), Sampler(5), Sampler(20), Sampler(100, eta=1.0))
 """How a diffusion is sampled, by effort; the last one is the paper's."""
 
-_TRAINED_BY = {FINGERS: "train-fingers", "multi-task-sac": "train-sac"}
+_TRAINED_BY = {
+    FINGERS: "train-fingers",
+    "multi-task-sac": "train-sac",
+    **{stage: f"train-stage {stage}" for stage in STAGES},
+}
 """The command that trains a policy, where it is not `train POLICY`."""
 
 
@@ -57,6 +72,19 @@ def load_finger_tracker(
     """
     policy = load_network(policy_path(FINGERS, weights), FINGERS)[0]
     return FingerResidualTracker(policy, DynamicTracker(world=world))
+
+
+def load_stages(weights: str | Path | None = None) -> Stages:
+    """The policies of the player of three stages.
+
+    Args:
+        weights: folder of the weights; see `weights_folder`.
+
+    Raises:
+        InputError: some are not there, or cannot be read.
+    """
+    files = zip(weight_files(THREE_STAGE, weights), STAGES, strict=True)
+    return Stages(*(load_network(path, name)[0] for path, name in files))
 
 
 def load_policy_tracker(

@@ -27,9 +27,10 @@ _MOST_NUMBERS = 1000
 _NORMALIZER_RANGE = {"median": (-100.0, 100.0), "unit": (1e-6, 100.0), "limit": (0.0, 50.0)}
 """[rad, m]; a limit has no unit. Beyond, an action would not be a finite number."""
 
-Level = Literal["high", "low", "end-to-end", "finger"]
+Level = Literal["high", "low", "end-to-end", "finger", "fingering", "hand-motion", "hand-controls"]
 """From goals to fingertips; from fingertips to controls; from goals straight to controls; from one
-finger's surroundings to what it adds to the base controller."""
+finger's surroundings to what it adds to the base controller; and the stages of a player of three:
+from goals to fingers, from these to the fingertips of a hand, and on to its controls."""
 NetworkKind = Literal["diffusion", "bet", "mlp"]
 Prediction = Literal["epsilon", "sample"]
 """What a diffusion network outputs: the noise, or the sample without it (Ho et al., "Denoising

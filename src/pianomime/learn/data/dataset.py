@@ -17,10 +17,11 @@ from pianomime.errors import InputError
 from pianomime.learn.data.published import read_published
 from pianomime.learn.data.trajectories import TrajectoryData, check_one_world
 from pianomime.plan.demonstration import TRAIN, Demonstration, is_demonstration
+from pianomime.policies.finger_assignment import flat_heights
 from pianomime.short_repr import short_repr
 from pianomime.shown import shown
 
-DEMONSTRATION_COLUMNS = ("goal", "fingertips")
+DEMONSTRATION_COLUMNS = ("goal", "fingertips", "finger_key")
 """Columns of data sets made of demonstrations."""
 TRAJECTORY_COLUMNS = (
     *DEMONSTRATION_COLUMNS,
@@ -41,7 +42,8 @@ class Dataset:
     """Frames of clips, T in all.
 
     Attributes:
-        columns: arrays (T, ...) by name.
+        columns: arrays (T, ...) by name; the heights of `fingertips` tell alone which press, see
+            `flat_heights`.
         ends: (N,) one past the last frame of each clip.
         song_id: (N,) number that clips of one song share.
         name: N names of the clips.
@@ -150,6 +152,7 @@ def demonstration_dataset(source: Path) -> Dataset:
                 {
                     "goal": one.score.roll(),
                     "fingertips": one.plan.fingertips.astype(np.float32),
+                    "finger_key": one.plan.finger_key,
                 },
             )
             for one in read_demonstrations(source)
@@ -201,6 +204,8 @@ def _concatenate(
         for column, array in arrays.items():
             if array.dtype.kind == "f" and not np.isfinite(array).all():
                 raise InputError(f"{source}: {column} of {name} has values that are not finite")
+        # A policy is played with these: data sets of planners hold how high fingers hover, too.
+        arrays["fingertips"] = flat_heights(arrays["fingertips"], arrays["finger_key"])
         names.append(name)
         songs.append(song)
         columns.append(arrays)

@@ -1,0 +1,1 @@
+"""Training of the three stages: fingering, motion of the hands, controls of the hands."""
