@@ -19,7 +19,7 @@ ORDER = (
     "transcription", "video", "learn", "evaluation", "replay", "report", "stage", "commands",
     "cli.py",
     "film", "keyboard", "hands", "notes",
-    "runs", "envs", "expert", "data", "goal", "imitation", "fingers", "sac",
+    "runs", "envs", "expert", "data", "goal", "imitation", "fingers", "sac", "three_stage",
 )  # fmt: skip
 
 

@@ -37,6 +37,8 @@ ALLOWED = {
     ("learn/envs/reward.py", "TIP_BOUND, TIP_MARGIN = 0.01, 0.05"),
     ("plan/hand_path.py", "alike_wrist: float = 0.05"),
     ("policies/finger_residual.py", "_DEPTH = 0.05"),
+    ("policies/three_stage/hand_controls.py", "_LENGTH = 0.05"),
+    ("policies/three_stage/hand_motion.py", "_LENGTH = 0.05"),
     ("world/perturbation.py", "_FAR_ASIDE = 0.05"),
     ("track/dynamic.py", "_WRIST_TOLERANCE = 0.05"),
     ("track/keystroke.py", "_WRIST_TOLERANCE = 0.05"),
@@ -44,6 +46,10 @@ ALLOWED = {
     ("video/hands/tracks.py", "_SAME_HAND = 0.05"),
     ("video/keyboard/refine.py", "[[0, -0.1], [-0.05, 0]]"),
     ("video/notes/key_light.py", '"between the black keys": (-0.050, -0.040)'),
+    # Frames ahead, and keys aside.
+    ("policies/three_stage/fingering.py", "_AHEAD = (0, 1,"),
+    ("policies/three_stage/fingering.py", "_REACH = 20"),
+    ("policies/three_stage/hand_motion.py", "_AHEAD = (0, 1,"),
     # Angles [rad] and accelerations [m/s^2].
     ("plan/joint_path.py", '"WRJ1": -0.05'),
     ("plan/joint_path.py", '"LFJ5": 0.05'),

@@ -95,6 +95,7 @@ def test_without_the_extra_it_says_what_to_install() -> None:
         ["collect", "run"],
         ["teach", "demo.npz"],
         ["train", "bc-mse", "--experts", "some.zarr"],
+        ["train-stage", "fingering", "--experts", "some.zarr"],
         *([name, "songs"] for name in ("train-goal", "train-sac", "train-fingers")),
     ):
         done = subprocess.run(
@@ -156,6 +157,8 @@ MISSING: list[tuple[list[str], str]] = [
         ["train", "high-diff-no-sdf", "--demonstrations", "demo.npz", "-o", "file"],
         "file: is a file",
     ),
+    (["train-stage", "fingering", "--experts", "no.zarr"], "does not exist; `pianomime "),
+    (["train-stage", "hand-motion", "--experts", "file"], "file: not a data set"),
     (["train-goal"], "FOLDER is missing"),
     (["train-goal", "empty"], "no MIDI files"),
     (["train-goal", "ode-to-joy"], "2 songs at least"),
