@@ -25,7 +25,7 @@ from pianomime.errors import InputError
 from pianomime.evaluation.evaluation import evaluate
 from pianomime.files import atomic
 from pianomime.players.builtin import ZERO_SHOT_20HZ
-from pianomime.policies.methods import FINGERS, GENERALISTS, WEIGHTS, weight_files
+from pianomime.policies.methods import FINGERS, GENERALISTS, THREE_STAGE, WEIGHTS, weight_files
 
 METRICS = ("precision", "recall", "f1")
 SETS = {"modern test12": "modern/test12", "Etude-12": "etude12"}
@@ -133,7 +133,7 @@ def seeds_of(method: str, effort: int, arguments: Any) -> tuple[int, ...]:
     if method in GENERALISTS:
         stochastic = GENERALISTS[method] not in (("bc-mse",), ("multi-task-sac",))
         return tuple(arguments.seeds) if stochastic else (0,)
-    return tuple(arguments.search_seeds) if effort else (0,)
+    return tuple(arguments.search_seeds) if effort and method != THREE_STAGE else (0,)
 
 
 def some(rows: list[Row], **wanted: Any) -> list[Row]:
@@ -291,9 +291,10 @@ def main() -> None:
             raise SystemExit(str(error)) from None
     if first is not None:
         os.environ[WEIGHTS] = str(first)
-    methods = [name for name in (*GENERALISTS, FINGERS) if available(name)]
-    missing = [name for name in (*GENERALISTS, FINGERS) if name not in methods]
-    players = [(method, arguments.effort) for method in methods if method in GENERALISTS]
+    learned = (*GENERALISTS, THREE_STAGE, FINGERS)
+    methods = [name for name in learned if available(name)]
+    missing = [name for name in learned if name not in methods]
+    players = [(method, arguments.effort) for method in methods if method != FINGERS]
     ours = [ZERO_SHOT_20HZ, *(name for name in methods if name == FINGERS)]
     players += [(name, effort) for effort in arguments.efforts for name in ours]
     rows = []

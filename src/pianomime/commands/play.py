@@ -30,8 +30,9 @@ class Play:
 
     Players:
       planned: zero-shot, zero-shot-20hz, zero-shot-ik, fingers
-      learned: two-stage-diff, two-stage-diff-no-sdf, two-stage-diff-res,
-        two-stage-bet, two-stage-mse, one-stage-diff, bc-mse, multi-task-sac
+      learned: three-stage, two-stage-diff, two-stage-diff-no-sdf,
+        two-stage-diff-res, two-stage-bet, two-stage-mse, one-stage-diff,
+        bc-mse, multi-task-sac
       of DEMO.npz: demonstration, demonstration-ik
       of one song: the folder of an expert
       `pianomime players` says what each is and needs.

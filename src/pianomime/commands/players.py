@@ -14,6 +14,7 @@ _ABOUT = {
     "zero-shot-20hz": "plays frames, as in the paper",
     "zero-shot-ik": "the same, the paper's tracker",
     "fingers": "zero-shot-20hz and a residual",
+    "three-stage": "fingers, fingertips, controls",
     "two-stage-diff": "diffusion policies, two levels",
     "two-stage-diff-no-sdf": "the same, without a goal encoder",
     "two-stage-diff-res": "the same, on the paper's tracker",

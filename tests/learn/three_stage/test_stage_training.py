@@ -61,25 +61,21 @@ def test_what_was_trained_plays(data, two_notes, tmp_path):
     np.testing.assert_array_equal(first.ctrl, again.ctrl)
 
 
-class Stopped(Exception):
-    """Stands for Ctrl-C."""
-
-
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_training_goes_on_to_the_same_weights(data, tmp_path, stage):
     config = replace(SHORT, trainer=replace(SHORT.trainer, checkpoint_seconds=0.0))
 
     def stop(phase: str, done: int, total: int, remark: str = "") -> None:
         if phase == "training" and done >= 3:
-            raise Stopped
+            raise KeyboardInterrupt
 
     whole = train_stage(stage, config, tmp_path / "whole", [data]).read_bytes()
-    with pytest.raises(Stopped):
+    with pytest.raises(KeyboardInterrupt):
         train_stage(stage, config, tmp_path / "parts", [data], stop)
     assert not (tmp_path / "parts" / f"{stage}.onnx").exists()
     assert train_stage(stage, config, tmp_path / "parts", [data]).read_bytes() == whole
+    other = replace(config, hidden=(16,))
     with pytest.raises(InputError, match="hidden"):
-        other = replace(config, hidden=(16,))
         train_stage(stage, other, tmp_path / "parts", [data], no_progress)
 
 
