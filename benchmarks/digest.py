@@ -44,7 +44,7 @@ from stored_plans import write_plans
 
 STORED = Path(__file__).with_name("digest.json")
 F1_TABLE = ROOT / "tests" / "quality" / "f1.json"
-PLAYERS = (ZERO_SHOT_20HZ, "zero-shot-ik", "fingers", "two-stage-diff", "two-stage-mse")
+PLAYERS = (ZERO_SHOT_20HZ, "zero-shot-ik", "fingers", "two-stage-diff")
 DEMONSTRATION_PLAYERS = ("demonstration", "demonstration-ik")
 REFERENCE = ("etude12", "modern/test12")
 Stored = dict[str, dict[str, str | float]]

@@ -69,10 +69,16 @@ def main() -> None:
     for entry in arguments.weights:
         count, _, folder = entry.partition("=")
         os.environ[WEIGHTS] = str(Path(folder).resolve())
+        if not (count.isdigit() and folder):
+            raise SystemExit(f"{entry}: not a number of songs and a folder, such as 300=out/w300")
         row: list[object] = [int(count)]
         for name in arguments.sets:
             results = evaluate(
-                songs_of(name), arguments.player, effort=0, jobs=arguments.jobs, out=arguments.played
+                songs_of(name),
+                arguments.player,
+                effort=0,
+                jobs=arguments.jobs,
+                out=arguments.played,
             )
             failed = [song for song in results["songs"] if "error" in song]
             if failed:

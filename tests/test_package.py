@@ -23,9 +23,11 @@ ROOT = Path(__file__).parents[1]
 DATA = (
     "plan/reach.json",
     "policies/weights/fingers.onnx",
+    "policies/weights/fingering.onnx",
+    "policies/weights/hand-controls.onnx",
+    "policies/weights/hand-motion.onnx",
     "policies/weights/high-diff.onnx",
     "policies/weights/low-diff.onnx",
-    "policies/weights/low-mse.onnx",
     "policies/weights/README.md",
     "py.typed",
     "songs/beethoven-ode-to-joy.mid",

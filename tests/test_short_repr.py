@@ -63,7 +63,7 @@ def test_odd_titles_stay_in_one_line(performance: pianomime.Performance) -> None
     assert "\x1b" not in repr(score)
 
 
-@pytest.mark.parametrize("name", ["zero-shot", "two-stage-mse"])
+@pytest.mark.parametrize("name", ["zero-shot", "two-stage-diff"])
 def test_players_say_their_name_and_effort(name: str) -> None:
     assert re.fullmatch(rf"<\w+Player '{name}', effort 1>", repr(pianomime.load_player(name)))
 

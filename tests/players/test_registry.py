@@ -127,10 +127,10 @@ def test_entry_points_bring_players(monkeypatch: pytest.MonkeyPatch, plugin: Pat
 
 
 def test_a_folder_of_weights_is_a_player(tmp_path: Path) -> None:
-    for name in ("high-diff", "low-mse"):
+    for name in ("high-diff", "low-diff"):
         shutil.copy(weights_folder() / f"{name}.onnx", tmp_path)
-    assert load_player(tmp_path, 0).name == "two-stage-mse"
-    shutil.copy(weights_folder() / "low-diff.onnx", tmp_path)
+    assert load_player(tmp_path, 0).name == "two-stage-diff"
+    shutil.copy(weights_folder() / "fingers.onnx", tmp_path)
     with pytest.raises(InputError, match="holds weights of several players; name one"):
         load_player(tmp_path)
     assert load_player(tmp_path / "two-stage-diff", 0).name == "two-stage-diff"
@@ -140,23 +140,23 @@ def test_a_folder_of_weights_is_a_player(tmp_path: Path) -> None:
 def test_a_level_of_ones_own_plays_with_the_bundled_other_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shutil.copy(weights_folder() / "low-mse.onnx", tmp_path)
+    shutil.copy(weights_folder() / "low-diff.onnx", tmp_path)
     with pytest.warns(UserWarning, match=r"has no high-diff\.onnx: the one that comes with"):
-        assert load_player(tmp_path, 0).name == "two-stage-mse"
+        assert load_player(tmp_path, 0).name == "two-stage-diff"
     with pytest.warns(UserWarning, match="high-diff"):
         files = player_files(tmp_path)
-    assert files == [bundled_weights() / "high-diff.onnx", tmp_path / "low-mse.onnx"]
+    assert files == [bundled_weights() / "high-diff.onnx", tmp_path / "low-diff.onnx"]
     # A player with neither level there does not come from elsewhere.
     monkeypatch.setenv("PIANOMIME_WEIGHTS", str(tmp_path))
     with pytest.raises(InputError, match=r"fingers\.onnx is not there: train it"):
         load_player("fingers", 0)
     with pytest.raises(InputError, match=r"high-bet\.onnx is not there: train it"):
         load_player("two-stage-bet", 0)
-    # A high level goes with more than one low level.
-    (tmp_path / "low-mse.onnx").unlink()
-    shutil.copy(bundled_weights() / "high-diff.onnx", tmp_path)
-    with pytest.raises(InputError, match=r"two-stage-diff, .*two-stage-mse"):
-        load_player(tmp_path)
+    # Of three stages, those that are missing are lent, too.
+    (tmp_path / "low-diff.onnx").unlink()
+    shutil.copy(bundled_weights() / "hand-motion.onnx", tmp_path)
+    with pytest.warns(UserWarning, match=r"has no (fingering|hand-controls)\.onnx"):
+        assert load_player(tmp_path, 0).name == "three-stage"
 
 
 def test_a_folder_of_something_else_is_one_line(tmp_path: Path) -> None:

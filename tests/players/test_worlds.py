@@ -72,12 +72,12 @@ class _Planned:
 
 
 def test_the_default_is_the_papers_world() -> None:
-    for name in (*PLANNED, "fingers", "two-stage-mse"):
+    for name in (*PLANNED, "fingers", "three-stage"):
         assert load_player(name, 0).world == "paper"
         assert load_player(name, 0, world="paper").world == "paper"
 
 
-@pytest.mark.parametrize("name", ["fingers", "two-stage-mse"])
+@pytest.mark.parametrize("name", ["fingers", "three-stage"])
 def test_policies_play_in_the_other_world_too(name: str) -> None:
     assert load_player(name, 0, world="solid").play(far_apart()).world == "solid"
 

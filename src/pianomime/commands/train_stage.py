@@ -14,7 +14,7 @@ from pianomime.shown import shown
 
 @dataclass(frozen=True)
 class TrainStage:
-    """Train one stage of the player three-stage, by imitation of the zero-shot player.
+    """Train one stage of the player three-stage, by imitation of zero-shot-20hz.
 
     The first stage says which finger presses each key, the second where the fingertips go, the
     third how the joints get them there. All learn from data sets that `pianomime perform` makes, in

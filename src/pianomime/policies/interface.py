@@ -27,6 +27,9 @@ ACTION_SIZES = {
 }
 """Numbers of the action for one frame, by level."""
 
+STAGES = ("fingering", "hand-motion", "hand-controls")
+"""Levels of the player of three stages, in order."""
+
 _OBSERVATIONS = {
     "finger": finger_residual.SIZE,
     "fingering": fingering.SIZE,
@@ -55,6 +58,8 @@ def outputs_of(info: PolicyInfo) -> Shapes:
     """What the network of a policy gives, in this order."""
     if info.level == "finger":
         return {"action": (info.action_size,)}
+    if info.level in STAGES:
+        return {"action": (CHUNK if info.level == "hand-motion" else 1, info.action_size)}
     if info.network == "bet":
         bins = {"probability": (info.chunk, None)}
         return {**bins, "actions": (info.chunk, None, info.action_size)}

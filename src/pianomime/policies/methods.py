@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pianomime.errors import InputError
 from pianomime.policies.finger_residual import FingerResidualTracker
+from pianomime.policies.interface import STAGES
 from pianomime.policies.network_file import load_network, load_policy
 from pianomime.policies.policy_tracker import PolicyTracker
 from pianomime.policies.sampler import Sampler
@@ -33,9 +34,6 @@ FINGERS = "fingers"
 
 THREE_STAGE = "three-stage"
 """The player that says fingers before it says places."""
-
-STAGES = ("fingering", "hand-motion", "hand-controls")
-"""Its policies, in order."""
 
 METHODS: dict[str, tuple[str, ...]] = {
     FINGERS: (FINGERS,),
@@ -83,8 +81,13 @@ def load_stages(weights: str | Path | None = None) -> Stages:
     Raises:
         InputError: some are not there, or cannot be read.
     """
-    files = zip(weight_files(THREE_STAGE, weights), STAGES, strict=True)
-    return Stages(*(load_network(path, name)[0] for path, name in files))
+    networks = []
+    for path, stage in zip(weight_files(THREE_STAGE, weights), STAGES, strict=True):
+        network, info = load_network(path, stage)
+        if (info.level, info.network) != (stage, "mlp"):
+            raise InputError(f"{path}: not a network of the stage {stage}")
+        networks.append(network)
+    return Stages(*networks)
 
 
 def load_policy_tracker(

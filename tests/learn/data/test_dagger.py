@@ -95,7 +95,7 @@ def test_a_policy_of_another_level_is_refused(two_notes):
 def test_a_fingertip_policy_and_a_rollout_policy_play(two_notes):
     weights = weights_folder()
     config = DaggerConfig(
-        rollout_policy=weights / "low-mse.onnx", fingertip_policy=weights / "high-diff.onnx"
+        rollout_policy=weights / "low-diff.onnx", fingertip_policy=weights / "high-diff.onnx"
     )
     shown, usual = (collect_dagger_episode(two_notes, 0, one) for one in (config, QUIET))
     assert not np.array_equal(shown.columns["fingertips"], usual.columns["fingertips"])

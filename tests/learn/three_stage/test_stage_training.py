@@ -19,7 +19,9 @@ from pianomime.learn.three_stage.fingering_samples import FingeringSamples
 from pianomime.learn.three_stage.hand_samples import ControlsSamples, MotionSamples
 from pianomime.learn.three_stage.training import train_stage
 from pianomime.plan.demonstration import Demonstration
-from pianomime.policies.three_stage.fingering import NOBODY
+from pianomime.plan.fingertip_plan import HOVER_HEIGHT
+from pianomime.policies.features import rest_points
+from pianomime.policies.three_stage.fingering import LOWEST
 from pianomime.policies.three_stage.hand_controls import controls_of_action
 from pianomime.policies.three_stage.hand_motion import points_of_action
 from pianomime.progress import no_progress
@@ -88,14 +90,67 @@ def test_fingering_learns_a_song_that_never_changes(data, two_notes, tmp_path):
     np.testing.assert_array_equal(performance.plan.finger_key, two_notes.plan.finger_key)
 
 
-def test_choices_are_those_of_the_data(dataset, two_notes):
-    samples = FingeringSamples.of(dataset)
-    keys = two_notes.plan.finger_key.reshape(-1, 10)
-    for row, key, choice in zip(samples.row, samples.key, samples.choice, strict=True):
+def chords() -> Dataset:
+    """Two keys at a time, by fingers that change, with hovering fingertips."""
+    goal = np.zeros((20, 88), bool)
+    finger_key = np.full((20, 2, 5), -1, np.int8)
+    for frame in range(20):
+        low, high = 30 + frame // 4, 50 + frame // 5
+        goal[frame, [low, high]] = True
+        finger_key[frame, 0, frame // 4 % 5], finger_key[frame, 1, frame // 5 % 5] = low, high
+    tips = np.random.default_rng(1).normal(size=(20, 2, 6, 3)).astype(np.float32)
+    columns = {"goal": goal, "finger_key": finger_key, "fingertips": tips}
+    return Dataset(columns, np.array([20]), np.array([0]), ["chords"])
+
+
+def test_choices_are_those_of_the_data():
+    clip = chords()
+    samples = FingeringSamples.of(clip)
+    pressed = clip.columns["finger_key"].reshape(20, 10)
+    plain = 0
+    for row, key, choice, below, used in zip(
+        samples.row, samples.key, samples.choice, samples.below, samples.used, strict=True
+    ):
         assert samples.goal[row, key]
-        assert choice != NOBODY
-    # Half of the samples are mirrored; of the others the first is that of the first note.
-    assert samples.choice[0] == np.flatnonzero(keys[samples.row[0] - 1] >= 0)[0]
+        # The first clip is as it is; the second is its image in a mirror.
+        if row > 20:
+            continue
+        plain += 1
+        assert pressed[row - 1, choice] == key
+        low = np.flatnonzero(samples.goal[row]).min()
+        first = key == low
+        assert below == (LOWEST if first else np.flatnonzero(pressed[row - 1] == low)[0])
+        assert np.flatnonzero(used).tolist() == ([] if first else [below])
+    assert plain >= 9
+
+
+def test_after_the_end_of_a_clip_nothing_is_pressed(dataset):
+    """As in play, where goals are silence then."""
+    held = dataset.columns["finger_key"].copy()
+    held[dataset.ends - 1, 0, 1] = 30
+    changed = replace(dataset, columns={**dataset.columns, "finger_key": held})
+    sample = ControlsSamples.of(changed).evenly(int(dataset.ends[-1]))["observation"]
+    presses = slice(27 + 27 + 18 + 96, 27 + 27 + 18 + 96 + 40)
+    last = sample[dataset.ends[1] - 1, presses].reshape(8, 5)
+    assert not last[1:].any()
+
+
+def test_a_silent_data_set_is_told(tmp_path):
+    silent = tmp_path / "silent.zarr"
+    columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    columns["finger_key"] -= 1
+    episodes = (Episode(str(number), 1.0, "ik", columns, number) for number in range(2))
+    write_trajectories(silent, episodes)
+    with pytest.raises(InputError, match="no notes"):
+        train_stage("fingering", SHORT, tmp_path, [silent])
+
+
+def test_heights_tell_alone_which_fingers_press(tmp_path, dataset, two_notes):
+    """The plans of planners also say how high fingers hover, which is not known in play."""
+    assert len(np.unique(two_notes.plan.fingertips[..., 2])) > 2
+    heights = dataset.columns["fingertips"][..., 1:, 2]
+    np.testing.assert_allclose(heights[dataset.columns["finger_key"] >= 0], 0.0)
+    np.testing.assert_allclose(heights[dataset.columns["finger_key"] < 0], HOVER_HEIGHT)
 
 
 def test_without_noise_motion_is_that_of_the_data(dataset):
@@ -103,11 +158,10 @@ def test_without_noise_motion_is_that_of_the_data(dataset):
     tips = dataset.columns["fingertips"]
     rows = np.linspace(0, dataset.ends[-1] - 1, len(sample["target"])).astype(int)
     starts = set(dataset.starts.tolist())
-    for number in range(0, len(rows), 7):
+    for number in [0, *range(1, len(rows), 7)]:
         row, side = rows[number], number % 2
-        if row in starts:
-            continue
-        before = tips[row - 1, side, :, :2].astype(float)
+        first = row in starts
+        before = (rest_points()[side] if first else tips[row - 1, side])[:, :2].astype(float)
         found = points_of_action(sample["target"][[number]], before[None], np.array([side]))
         np.testing.assert_allclose(found[0, 0], tips[row, side, :, :2], atol=1e-6)
 

@@ -28,8 +28,10 @@ from pianomime.policies.sampler import Sampler
 from pianomime.policies.stamp import stamped
 from pianomime.staging import scratch
 
-_MIN_HALVED = 1024
+_MIN_SHRUNK = 1024
 """Weights with fewer numbers than this are kept in 32 bits."""
+_MOST_INT8 = 127
+"""Greatest whole number of 8 bits that has a negative."""
 
 
 def export_policy(network: PolicyNetwork, info: PolicyInfo, path: Path) -> None:
@@ -53,6 +55,7 @@ def export_network(
     outputs: Sequence[str],
     info: PolicyInfo,
     path: Path,
+    compact: bool = False,
 ) -> None:
     """Write a network as ONNX, whole or not at all.
 
@@ -62,6 +65,7 @@ def export_network(
         outputs: names of the outputs.
         info: metadata of the policy.
         path: of the file.
+        compact: store matrices in 8 bits, one scale a row, rather than in 16.
 
     Raises:
         OSError: it cannot be written.
@@ -83,7 +87,7 @@ def export_network(
             dynamo=False,
         )
         model = onnx.load(str(raw))
-    _halve(model)
+    _shrink(model, compact)
     onnx.helper.set_model_props(model, {METADATA: info.to_metadata()})
     with atomic(path) as temporary:
         temporary.write_bytes(stamped(model.SerializeToString()))
@@ -144,20 +148,37 @@ def policy_info(network: PolicyNetwork, name: str, data: str = "") -> PolicyInfo
     )
 
 
-def _halve(model: Any) -> None:
-    """Store weights in 16 bits and cast them to 32 when the file is loaded: half the size."""
+def _shrink(model: Any, compact: bool) -> None:
+    """Store weights in fewer bits, and have them made 32 again when the file is loaded.
+
+    Args:
+        model: changed in place.
+        compact: matrices in 8 bits, one scale a row; otherwise everything large in 16.
+    """
     import onnx
 
-    casts = []
-    for weight in model.graph.initializer:
+    restored = []
+    for weight in list(model.graph.initializer):
         values = onnx.numpy_helper.to_array(weight)
-        if values.dtype != np.float32 or values.size < _MIN_HALVED:
+        if values.dtype != np.float32 or values.size < _MIN_SHRUNK:
             continue
         name = weight.name
-        half = onnx.numpy_helper.from_array(values.astype(np.float16), f"{name}/half")
-        weight.CopyFrom(half)
-        casts.append(onnx.helper.make_node("Cast", [half.name], [name], to=onnx.TensorProto.FLOAT))
-    nodes = [*casts, *model.graph.node]
+        small = f"{name}/small"
+        if compact and values.ndim == 2:
+            scale = np.maximum(np.abs(values).max(axis=1), np.finfo(np.float32).tiny) / _MOST_INT8
+            rounded = np.rint(values / scale[:, None]).astype(np.int8)
+            weight.CopyFrom(onnx.numpy_helper.from_array(rounded, small))
+            scales = onnx.numpy_helper.from_array(scale.astype(np.float32), f"{name}/scale")
+            model.graph.initializer.append(scales)
+            restored.append(
+                onnx.helper.make_node("DequantizeLinear", [small, scales.name], [name], axis=0)
+            )
+        else:
+            weight.CopyFrom(onnx.numpy_helper.from_array(values.astype(np.float16), small))
+            restored.append(
+                onnx.helper.make_node("Cast", [small], [name], to=onnx.TensorProto.FLOAT)
+            )
+    nodes = [*restored, *model.graph.node]
     del model.graph.node[:]
     model.graph.node.extend(nodes)
 

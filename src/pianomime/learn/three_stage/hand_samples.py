@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import NO_KEY
-from pianomime.learn.data.dataset import Dataset
+from pianomime.learn.data.dataset import DEMONSTRATION_COLUMNS, Dataset
 from pianomime.policies.features import rest_points
 from pianomime.policies.horizon import CHUNK
 from pianomime.policies.three_stage.hand_controls import (
@@ -21,6 +21,9 @@ from pianomime.policies.three_stage.hand_motion import PRESSES, motion_action, m
 from pianomime.short_repr import short_repr
 from pianomime.world.hand import both_hands, hand_points
 from pianomime.world.layout import LAYOUT, POINT_COUNT
+
+CONTROLS_COLUMNS = (*DEMONSTRATION_COLUMNS, "joints", "velocities", "keys", "action")
+"""Columns of a data set that the third stage learns from."""
 
 _Batch = dict[str, NDArray[Any]]
 _SHAKEN = 0.7
@@ -49,6 +52,10 @@ class MotionSamples:
     dataset: Dataset
 
     __repr__ = short_repr
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return int(self.dataset.ends[-1])
 
     def draw(self, rng: np.random.Generator, batch: int) -> _Batch:
         """A random batch, with noise: `observation` (B, SIZE) and `target` (B, CHUNK, PLANE)."""
@@ -99,7 +106,7 @@ class ControlsSamples:
     """Samples of a data set for the third stage; one is a hand in a frame.
 
     Attributes:
-        dataset: with all columns of trajectories.
+        dataset: with the columns in `CONTROLS_COLUMNS`.
         points: (T, 2, 6, 3) wrists and fingertips before each frame [m].
     """
 
@@ -112,6 +119,10 @@ class ControlsSamples:
     def of(cls, dataset: Dataset) -> ControlsSamples:
         """Prepare the samples of a data set."""
         return cls(dataset, hand_points(dataset.columns["joints"]).astype(np.float32))
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return int(self.dataset.ends[-1])
 
     def draw(self, rng: np.random.Generator, batch: int) -> _Batch:
         """A random batch, with noise: `observation` (B, SIZE) and `target` (B, 1, 23)."""
@@ -129,9 +140,12 @@ class ControlsSamples:
     ) -> _Batch:
         columns = self.dataset.columns
         _, end = _clip(self.dataset, row)
-        ahead = np.minimum(row[:, None] + np.arange(TARGETS), end[:, None] - 1)
-        presses = columns["finger_key"][ahead, side[:, None]]
-        targets = columns["fingertips"][ahead, side[:, None]].astype(np.float64)
+        ahead = row[:, None] + np.arange(TARGETS)
+        there = np.minimum(ahead, end[:, None] - 1), side[:, None]
+        # After the end nothing is pressed, and the last points are held.
+        over = (ahead >= end[:, None])[..., None]
+        presses = np.where(over, NO_KEY, columns["finger_key"][there])
+        targets = columns["fingertips"][there].astype(np.float64)
         idle = np.pad(presses < 0, ((0, 0), (0, 0), (1, 0)), constant_values=True)
         targets[..., :2] += noise * idle[..., None]
         joints, velocities = (

@@ -32,11 +32,12 @@ class StageNetwork(nn.Module, ABC):
     def __init__(self, inputs: int, outputs: tuple[int, int], config: StageConfig) -> None:
         super().__init__()
         layers: list[nn.Module] = []
-        for before, after in pairwise((inputs, *config.hidden)):
+        sizes = (inputs, *config.hidden)
+        for before, after in pairwise(sizes):
             layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.GELU()]
             if config.dropout:
                 layers.append(nn.Dropout(config.dropout))
-        self.layers = nn.Sequential(*layers, nn.Linear(config.hidden[-1], int(np.prod(outputs))))
+        self.layers = nn.Sequential(*layers, nn.Linear(sizes[-1], int(np.prod(outputs))))
         self.normalizer = StandardNormalizer(inputs)
         self.outputs = outputs
 

@@ -15,7 +15,6 @@ from torch import nn
 from pianomime.errors import InputError
 from pianomime.learn.data.dataset import (
     DEMONSTRATION_COLUMNS,
-    TRAJECTORY_COLUMNS,
     Dataset,
     trajectory_dataset,
 )
@@ -23,7 +22,11 @@ from pianomime.learn.imitation.export import export_network
 from pianomime.learn.runs.trainer import train_network
 from pianomime.learn.three_stage.config import StageConfig, StageName
 from pianomime.learn.three_stage.fingering_samples import FingeringSamples
-from pianomime.learn.three_stage.hand_samples import ControlsSamples, MotionSamples
+from pianomime.learn.three_stage.hand_samples import (
+    CONTROLS_COLUMNS,
+    ControlsSamples,
+    MotionSamples,
+)
 from pianomime.learn.three_stage.network import ChoiceNetwork, MotionNetwork, StageNetwork
 from pianomime.policies.horizon import CHUNK
 from pianomime.policies.policy import PolicyInfo
@@ -66,12 +69,14 @@ def train_stage(
         OSError: a file cannot be read or written.
     """
     progress("reading", 0, 0)
-    columns = TRAJECTORY_COLUMNS if name == "hand-controls" else DEMONSTRATION_COLUMNS
+    columns = CONTROLS_COLUMNS if name == "hand-controls" else DEMONSTRATION_COLUMNS
     dataset = trajectory_dataset(experts, columns)
     if len(set(dataset.song_id.tolist())) < 2:
         raise InputError("two songs at least are needed, one of them for validation")
     train, validation = (_samples(name, part) for part in dataset.split())
     seed = config.trainer.seed
+    if not (len(train) and len(validation)):
+        raise InputError("the data hold no notes to learn from, or none in songs for validation")
     sample = train.draw(np.random.default_rng(seed), _NORMALIZER_SAMPLES)
     inputs, outputs = sample["observation"].shape[1], _OUTPUTS[name]
     torch.manual_seed(seed)
@@ -98,7 +103,7 @@ def train_stage(
     progress("exporting", 0, 0)
     result = out / f"{name}.onnx"
     info = PolicyInfo(name, name, "mlp", outputs[1], outputs[0], data=digest)
-    export_network(network, {"observation": torch.zeros(2, inputs)}, ["action"], info, result)
+    export_network(network, {"observation": torch.zeros(2, inputs)}, ["action"], info, result, True)
     return result
 
 

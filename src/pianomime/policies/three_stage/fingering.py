@@ -130,12 +130,8 @@ def key_observation(
         "name of the key": np.eye(KEYS_PER_OCTAVE)[key % KEYS_PER_OCTAVE],
         "place": (key - KEYS / 2) / _QUARTER,
     }
-    observation = np.zeros((len(key), SIZE), np.float32)
-    first = 0
-    for name, part in parts.items():
-        observation[:, first : first + _PARTS[name]] = part.reshape(len(key), -1)
-        first += _PARTS[name]
-    return observation
+    rows = [part.reshape(len(key), -1) for part in parts.values()]
+    return np.hstack([*rows, np.zeros((len(key), _DECIDED))]).astype(np.float32)
 
 
 def decided(below: NDArray[np.int64], used: NDArray[np.bool_]) -> NDArray[np.float32]:

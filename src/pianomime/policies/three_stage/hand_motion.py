@@ -7,7 +7,6 @@ to the wrist, so what is learned in one octave holds in all.
 from __future__ import annotations
 
 from collections import deque
-from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +146,7 @@ class HandMotionRollout:
     def step(self) -> tuple[NDArray[np.float64], NDArray[np.int8]]:
         """The points (2, 6, 3) [m] of the next frame, and what its fingers press (2, 5)."""
         self._presses.append(self._fingering.step())
-        ahead = np.array(list(islice(self._presses, PRESSES))).swapaxes(0, 1)
+        ahead = np.array(self._presses).swapaxes(0, 1)
         side = np.arange(2)
         observation = motion_observation(ahead, self._points, self._before, side)
         action = self._policy({"observation": observation})[0]
