@@ -1,0 +1,103 @@
+"""What each stage of `three-stage` costs: its networks take the planner's place one by one.
+
+    python benchmarks/stages.py SONG.mid ... [--seconds 30]
+
+plays every song four times at effort 0: as `zero-shot-20hz` does; with the fingers that `fingering`
+says, along planned paths; with the fingertips that `hand-motion` predicts, too; and by
+`three-stage`. The first three have the same tracker, inverse dynamics. Prints the mean precision,
+recall and F1.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+import common
+from pianomime import Score, excerpt, load_player
+from pianomime.plan import FingertipPlan
+from pianomime.plan.hand_path import hand_paths
+from pianomime.players.builtin import ZERO_SHOT_20HZ
+from pianomime.players.player import PlannedPlayer
+from pianomime.policies.methods import THREE_STAGE, load_stages
+from pianomime.policies.three_stage.fingering import FingeringRollout
+from pianomime.policies.three_stage.hand_motion import HandMotionRollout
+from pianomime.songs.find import find_songs
+from pianomime.track import DynamicTracker
+
+METRICS = ("precision", "recall", "f1")
+
+
+class NetworkPlanner:
+    """Plans with the first stage, or with the first two.
+
+    Args:
+        motion: whether the second stage says where fingertips go; otherwise paths are planned.
+    """
+
+    def __init__(self, motion: bool) -> None:
+        self._motion = motion
+
+    def plan(self, score: Score) -> FingertipPlan:
+        """One row for each frame of the score; nothing of its notes."""
+        stages, roll = load_stages(), score.roll()
+        fingering = FingeringRollout(roll, stages.fingering)
+        if self._motion:
+            motion = HandMotionRollout(fingering, stages.motion)
+            rows = [motion.step() for _ in roll]
+            points, keys = (np.array(column) for column in zip(*rows, strict=True))
+        else:
+            keys = np.array([fingering.step() for _ in roll])
+            points = hand_paths(keys)
+        nobody = np.full(len(score), -1, np.int8)
+        return FingertipPlan(points, keys, nobody, nobody)
+
+
+PLAYERS: dict[str, Callable[[], object]] = {
+    ZERO_SHOT_20HZ: partial(load_player, ZERO_SHOT_20HZ, 0),
+    "fingers by the network": lambda: PlannedPlayer(
+        "fingers", NetworkPlanner(False), DynamicTracker()
+    ),
+    "and fingertips": lambda: PlannedPlayer("tips", NetworkPlanner(True), DynamicTracker()),
+    f"and controls: {THREE_STAGE}": partial(load_player, THREE_STAGE, 0),
+}
+
+
+def play(song: Path, seconds: float) -> list[list[float]]:
+    """Metrics of a song, a row for each player."""
+    score = excerpt(Score.from_midi(song), seconds=seconds)
+    rows = []
+    for make in PLAYERS.values():
+        metrics = make().play(score).metrics()
+        rows.append([metrics[name] for name in METRICS])
+    return rows
+
+
+def main() -> None:
+    """Play, and print the table."""
+    options = common.parser("stages", __doc__)
+    options.add_argument("songs", nargs="+")
+    options.add_argument("--seconds", type=float, default=30.0)
+    options.add_argument("--jobs", type=int, default=len(common.cores()))
+    arguments = options.parse_args()
+    facts = common.machine()
+    common.show_machine(facts)
+    songs = find_songs(arguments.songs)
+    with ProcessPoolExecutor(arguments.jobs, get_context("spawn")) as pool:
+        found = list(pool.map(partial(play, seconds=arguments.seconds), songs))
+    rows = [
+        [name, *(round(statistics.mean(each), 3) for each in zip(*mine, strict=True))]
+        for name, mine in zip(PLAYERS, zip(*found, strict=True), strict=True)
+    ]
+    common.table(["player", *METRICS], rows)
+    common.report(arguments.output, facts, {"songs": [song.name for song in songs], "rows": rows})
+
+
+if __name__ == "__main__":
+    main()
