@@ -24,7 +24,7 @@ from pianomime import Score, excerpt, load_player
 from pianomime.plan import FingertipPlan
 from pianomime.plan.hand_path import hand_paths
 from pianomime.players.builtin import ZERO_SHOT_20HZ
-from pianomime.players.player import PlannedPlayer
+from pianomime.players.player import PlannedPlayer, Player
 from pianomime.policies.methods import THREE_STAGE, load_stages
 from pianomime.policies.three_stage.fingering import FingeringRollout
 from pianomime.policies.three_stage.hand_motion import HandMotionRollout
@@ -59,7 +59,7 @@ class NetworkPlanner:
         return FingertipPlan(points, keys, nobody, nobody)
 
 
-PLAYERS: dict[str, Callable[[], object]] = {
+PLAYERS: dict[str, Callable[[], Player]] = {
     ZERO_SHOT_20HZ: partial(load_player, ZERO_SHOT_20HZ, 0),
     "fingers by the network": lambda: PlannedPlayer(
         "fingers", NetworkPlanner(False), DynamicTracker()
