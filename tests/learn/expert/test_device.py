@@ -65,7 +65,10 @@ def test_a_missing_package_is_told_before_any_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def without_warp(name: str) -> Any:
-        return None if name == "mujoco_warp" else find_spec(name)
+        # As if the other one were there, whether it is or not.
+        if name in ("warp", "mujoco_warp"):
+            return find_spec("json") if name == "warp" else None
+        return find_spec(name)
 
     monkeypatch.setattr("pianomime.world.device_batch.find_spec", without_warp)
     out = tmp_path / "run"
