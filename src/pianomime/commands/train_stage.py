@@ -23,9 +23,8 @@ class TrainStage:
     PIANOMIME_WEIGHTS=OUT to play with the stages in OUT.
 
     Examples:
-      pianomime perform MIDI_FOLDER -o songs.zarr --noise 0.2
-      pianomime train-stage fingering --experts songs.zarr
-      pianomime train-stage hand-motion --experts songs.zarr
+      pianomime train-stage fingering --experts songs.zarr --dropout 0.1
+      pianomime train-stage hand-motion --experts songs.zarr more.zarr
       pianomime train-stage hand-controls --experts songs.zarr
       PIANOMIME_WEIGHTS=out/generalist pianomime play SONG.mid --player three-stage
     """
