@@ -59,6 +59,7 @@ from pianomime.errors import InputError
 from pianomime.evaluation.evaluation import read_row
 from pianomime.plan.demonstration import Demonstration
 from pianomime.players.performance import Performance, is_performance
+from pianomime.policies.interface import inputs_of
 from pianomime.policies.methods import policy_path
 from pianomime.policies.network_file import load_network
 from pianomime.policies.stamp import stamped
@@ -277,15 +278,8 @@ def _read_goal(path: Path) -> Any:
 
 def _read_policy(path: Path) -> Any:
     run, info = load_network(path)
-    if info.level == "finger":
-        inputs: Arrays = {"observation": np.ones((10, 51), np.float32)}
-    else:
-        inputs = {
-            "goal": np.ones((1, 4, 88), np.float32),
-            "frames": np.ones((1, 4, 72), np.float32),
-            "vector": np.ones((1, 232), np.float32),
-        }
-    return [vars(info), run(inputs)]
+    (size,) = inputs_of(info)["observation"]
+    return [vars(info), run({"observation": np.ones((10, size), np.float32)})]
 
 
 def _read_points(path: Path) -> Any:
@@ -634,7 +628,7 @@ KINDS = {
     "trajectories .zarr": Kind(_trajectories, _read_trajectories, _edit_zarr, ".zarr"),
     "goal encoder .safetensors": Kind(_goal, _read_goal, _edit_goal, ""),
     "policy of fingers .onnx": Kind(_policy("fingers"), _read_policy, _edit_policy, ".onnx"),
-    "policy of controls .onnx": Kind(_policy("low-mse"), _read_policy, _edit_policy, ".onnx"),
+    "policy of controls .onnx": Kind(_policy("hand-controls"), _read_policy, _edit_policy, ".onnx"),
     "points .json": Kind(_points, _read_points, _edit_points, ".json", free=True, ours=False),
     "published clips .npz": Kind(_clips, _read_published, _archive(False), ".npz", ours=False),
     "published .zarr": Kind(
