@@ -39,9 +39,16 @@ class MlpNet(nn.Module):
         return nn.functional.mse_loss(predicted.float(), target)
 
 
-def hidden_layers(widths: Sequence[int]) -> nn.Sequential:
-    """Linear layers from each width to the next, each with layer normalization and GELU."""
+def hidden_layers(widths: Sequence[int], dropout: float = 0.0) -> nn.Sequential:
+    """Linear layers from each width to the next, each with layer normalization and GELU.
+
+    Args:
+        widths: of the input, and of each layer.
+        dropout: share of the numbers after each that are left out at random in training.
+    """
     layers: list[nn.Module] = []
     for before, after in pairwise(widths):
         layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.GELU()]
+        if dropout:
+            layers.append(nn.Dropout(dropout))
     return nn.Sequential(*layers)

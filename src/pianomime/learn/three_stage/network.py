@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from pianomime.learn.imitation.mlp import hidden_layers
 from pianomime.learn.imitation.normalizer import AsinhNormalizer, StandardNormalizer
 from pianomime.learn.three_stage.config import StageConfig
 
@@ -31,13 +31,10 @@ class StageNetwork(nn.Module, ABC):
 
     def __init__(self, inputs: int, outputs: tuple[int, int], config: StageConfig) -> None:
         super().__init__()
-        layers: list[nn.Module] = []
         sizes = (inputs, *config.hidden)
-        for before, after in pairwise(sizes):
-            layers += [nn.Linear(before, after), nn.LayerNorm(after), nn.GELU()]
-            if config.dropout:
-                layers.append(nn.Dropout(config.dropout))
-        self.layers = nn.Sequential(*layers, nn.Linear(sizes[-1], int(np.prod(outputs))))
+        self.layers = nn.Sequential(
+            *hidden_layers(sizes, config.dropout), nn.Linear(sizes[-1], int(np.prod(outputs)))
+        )
         self.normalizer = StandardNormalizer(inputs)
         self.outputs = outputs
 
