@@ -53,7 +53,7 @@ ALLOWED = {
     # Angles [rad] and accelerations [m/s^2].
     ("plan/joint_path.py", '"WRJ1": -0.05'),
     ("plan/joint_path.py", '"LFJ5": 0.05'),
-    ("track/note_sampling.py", "wrist: float = 0.05"),
+    ("track/sampling/note_sampling.py", "wrist: float = 0.05"),
     ("plan/hand_path.py", "slide_acceleration=20.0"),
     # Steps of brightness, of 255, angles of hues [degrees], and counts of white keys.
     ("video/notes/lit.py", "_COLOURFUL = 30.0"),
@@ -70,7 +70,7 @@ ALLOWED = {
     ("music/protocol.py", "pedal: float = 0.050"),
     ("songs/notation.py", "RELEASE = 0.05"),
     ("media/sound.py", "_JITTER = 0.05"),
-    ("track/note_cost.py", "_OPEN = 0.05"),
+    ("track/sampling/note_cost.py", "_OPEN = 0.05"),
     ("commands/progress.py", "_LINE_SECONDS = 30.0"),
     ("evaluation/robust_grid.py", "Perturbation(delay=0.05)"),
     # Shares, probabilities and costs.

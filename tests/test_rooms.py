@@ -65,7 +65,7 @@ VIDEO = (
     ("summary",),
 )
 
-LEARN_ONLY = ("torch", "stable_baselines3", "diffusers", "accelerate", "gymnasium")
+LEARN_ONLY = ("torch", "stable_baselines3", "sb3_contrib", "diffusers", "accelerate", "gymnasium")
 """Libraries that only learn/ imports."""
 LISTENER = ("pianomime.transcription.transkun", "torch")
 """The one file elsewhere that imports one of them, and is imported when it is needed."""

@@ -33,6 +33,8 @@ def test_length_and_dropped_notes() -> None:
         ("finger_key", np.zeros((3, 2, 5), np.int8), "finger_key must be"),
         ("finger_key", np.zeros((4, 10), np.int8), "finger_key must be"),
         ("note_hand", np.zeros(2, np.int8), "one entry per note"),
+        ("joints", np.zeros((4, 2, 23)), "joints must be"),
+        ("joints", np.zeros((3, 2, 27)), "joints must be"),
     ],
 )
 def test_refuses_what_does_not_fit(name: str, value: NDArray[np.generic], message: str) -> None:

@@ -11,6 +11,8 @@ from pianomime.keyboard import NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.songs.find import find_song
+from pianomime.world.hand import Hand
+from pianomime.world.model import SIDES
 from pianomime.world.parameters import key_centres
 
 
@@ -92,3 +94,15 @@ def test_is_deterministic() -> None:
     one, other = (ZeroShotPlanner().plan(score) for _ in range(2))
     np.testing.assert_array_equal(one.fingertips, other.fingertips)
     np.testing.assert_array_equal(one.finger_key, other.finger_key)
+
+
+def test_the_joints_of_a_plan_have_its_points() -> None:
+    plan = ZeroShotPlanner().plan(Score.from_midi(find_song("bach-prelude-c")).clip(0.0, 4.0))
+    assert plan.joints is not None
+    for index, side in enumerate(SIDES):
+        points = Hand(side).points_along(plan.joints[:, index])
+        idle = plan.finger_key[:, index] == NO_KEY
+        np.testing.assert_array_equal(points[:, 0], plan.fingertips[:, index, 0])
+        np.testing.assert_array_equal(points[:, 1:][idle], plan.fingertips[:, index, 1:][idle])
+        # Of a finger that presses, a plan says that it does, and not how deep it goes.
+        np.testing.assert_array_equal(points[..., :2], plan.fingertips[:, index, :, :2])

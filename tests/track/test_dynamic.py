@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -15,7 +16,7 @@ from pianomime.plan import FingertipPlan, ZeroShotPlanner
 from pianomime.plan.joint_path import HOME
 from pianomime.players import rollout
 from pianomime.songs.find import find_song
-from pianomime.track import DynamicTracker, IkTracker, Tracker
+from pianomime.track import DynamicConfig, DynamicTracker, IkTracker, Tracker
 from pianomime.track.dynamic import motion_torque, press_torque, to_actuators
 from pianomime.world import World
 from pianomime.world.hand import Hand
@@ -156,3 +157,20 @@ def test_plays_an_easy_song() -> None:
 def test_short_plans(make: type[DynamicTracker] | type[IkTracker], frames: int) -> None:
     away, _ = follow(make(), plan_of([swinging(hand, frames) for hand in HANDS.values()]))
     assert np.isfinite(away).all()
+
+
+def test_a_path_that_begins_from_the_plan_is_better_with_fewer_steps() -> None:
+    """What the planner knows of the joints gains: else they are found from the home pose."""
+    score = Score.from_midi(find_song("joplin-maple-leaf-rag")).clip(0.0, 8.0)
+    plan = ZeroShotPlanner().plan(score)
+    assert plan.joints is not None
+    unknown = replace(plan, joints=None)
+    config, away = DynamicConfig(), []
+    assert config.refine < config.path.iterations
+    for each in (plan, unknown):
+        controller = DynamicTracker(config).start(each)
+        aims = np.stack([controller.aim(frame + 1)[0] for frame in range(len(plan) - 1)])
+        pressing = plan.finger_key[:-1] != NO_KEY
+        goal = plan.fingertips[:-1, :, 1:, :2]
+        away.append(np.linalg.norm((aims[..., :2] - goal)[pressing], axis=-1).mean())
+    assert away[0] < away[1]

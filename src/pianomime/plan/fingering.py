@@ -177,6 +177,23 @@ class _Beam:
             np.array([[-0.14, 0.14]]),
         )
 
+    def _hand(self, side: int, earliest: int) -> tuple[Fingers, NDArray[np.int64]]:
+        """The H different states of one hand, and which of them (B,) each row has.
+
+        Rows that differ in the other hand alone cost the same for this one, and most do.
+
+        Args:
+            side: `LEFT` or `RIGHT`.
+            earliest: all frames before it are alike for keys that went down in them.
+        """
+        key, since, until = (each[:, side] for each in (self.key, self.since, self.until))
+        since = np.maximum(since, earliest - 1)
+        place = self.centre[:, side].copy().view(np.int64)[:, None]
+        state = np.ascontiguousarray(np.hstack([key, since, until, place]))
+        whole = state.view(np.dtype((np.void, state.itemsize * state.shape[1])))[:, 0]
+        _, first, row = np.unique(whole, return_index=True, return_inverse=True)
+        return Fingers(key[first], since[first], until[first], self.centre[first, side]), row
+
     def extend(
         self, struck: Struck, factor: NDArray[np.float64], config: FingeringConfig
     ) -> tuple[_Beam, _Choice]:
@@ -188,22 +205,22 @@ class _Beam:
             config: the costs.
         """
         options, pairs = _options_in_reach(struck.keys, config)
-        hands = []
+        hands, rows = [], []
         for side in (LEFT, RIGHT):
             strikes = _strikes(options[side], struck.keys)
-            fingers = Fingers(
-                self.key[:, side], self.since[:, side], self.until[:, side], self.centre[:, side]
-            )
+            fingers, row = self._hand(side, struck.onset - config.early)
             hands.append(hand_cost(side, fingers, strikes, struck, config))
+            rows.append(row[:, None])
         left, right = hands
         # (P, M): who plays each note.
         mine, other = options[LEFT][pairs[:, LEFT]], options[RIGHT][pairs[:, RIGHT]]
         assigned = np.where(mine >= 0, mine, np.where(other >= 0, other + FINGER_COUNT, -1))
         frames = np.minimum(struck.lost(struck.onset, struck.ends), config.most_frames)
         left_out = config.drop * struck.unit * factor + frames
-        apart = right.centre[:, pairs[:, RIGHT]] - left.centre[:, pairs[:, LEFT]]
+        at_left, at_right = ((rows[side], pairs[:, side]) for side in (LEFT, RIGHT))
+        apart = right.centre[at_right] - left.centre[at_left]
         total = self.cost[:, None] + (assigned < 0) @ left_out
-        total += left.cost[:, pairs[:, LEFT]] + right.cost[:, pairs[:, RIGHT]]
+        total += left.cost[at_left] + right.cost[at_right]
         total += config.crossed * struck.unit * (apart < config.apart)
 
         keep = min(config.beam, total.size)
@@ -213,7 +230,8 @@ class _Beam:
         def both(name: str) -> NDArray[Any]:
             """(keep, 2, ...) An attribute of the chosen continuations of both hands."""
             each = [
-                getattr(hand, name)[parent, pairs[pair, side]] for side, hand in enumerate(hands)
+                getattr(hand, name)[rows[side][parent, 0], pairs[pair, side]]
+                for side, hand in enumerate(hands)
             ]
             return np.stack(each, axis=1)
 
@@ -264,19 +282,22 @@ def _options(notes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         pairs (P, 2), which options of the left and the right hand go together. Fingers do not
         cross, within a hand or between hands.
     """
-    rows: dict[tuple[int, ...], int] = {}
-    pairs = []
     # Ten fingers from bass to treble: left little .. left thumb, right thumb .. right little.
-    left = [4, 3, 2, 1, 0]
+    finger = np.array([4, 3, 2, 1, 0, 0, 1, 2, 3, 4])
     fewest = max(0, notes - _MOST_DROPPED.get(notes, notes))
+    halves = []
     for played in sorted({*range(min(notes, 2) + 1), *range(fewest, notes + 1)}):
-        for which in combinations(range(notes), played):
-            for places in combinations(range(2 * FINGER_COUNT), played):
-                mine = np.full((2, notes), -1)
-                for note, place in zip(which, places, strict=True):
-                    if place < FINGER_COUNT:
-                        mine[LEFT, note] = left[place]
-                    else:
-                        mine[RIGHT, note] = place - FINGER_COUNT
-                pairs.append([rows.setdefault(tuple(half), len(rows)) for half in mine])
-    return np.array(list(rows), np.int64).reshape(-1, notes), np.array(pairs)
+        which, places = (
+            np.array(list(combinations(range(many), played)), np.int64)
+            for many in (notes, 2 * FINGER_COUNT)
+        )
+        mine = np.full((len(which), len(places), 2, notes), -1)
+        way = np.arange(len(which))[:, None, None], np.arange(len(places))[:, None]
+        mine[*way, places // FINGER_COUNT, which[:, None]] = finger[places]
+        halves.append(mine.reshape(-1, notes))
+    # Options are numbered as they first occur; one number for each compares faster than a row.
+    options = np.concatenate(halves)
+    number = (options + 1) @ (FINGER_COUNT + 1) ** np.arange(notes)
+    _, first, row = np.unique(number, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return options[first[order]], np.argsort(order)[row].reshape(-1, 2)

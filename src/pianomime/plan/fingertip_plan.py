@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE, KEYS
 from pianomime.short_repr import count, short_repr
+from pianomime.world.layout import LAYOUT
 
 if TYPE_CHECKING:
     from pianomime.plan.strikes import Strikes
@@ -42,6 +43,9 @@ class FingertipPlan:
         note_finger: (N,) int8; finger of each note: 0 thumb .. 4 little, -1 not played.
         strikes: when keys are to sound and how loud, between frames; None for plans of frames
             alone, such as a human's. Files do not hold them.
+        joints: (T, 2, 27) joint positions with which the robot's hands have their points there
+            [rad, m]; None where they are not known, as for a human's plan. A tracker may begin
+            from them. Files do not hold them.
 
     Raises:
         ValueError: shapes do not match, or `fingertips` is not finite.
@@ -52,6 +56,7 @@ class FingertipPlan:
     note_hand: NDArray[np.int8]
     note_finger: NDArray[np.int8]
     strikes: Strikes | None = None
+    joints: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         frames = len(self.fingertips)
@@ -59,6 +64,8 @@ class FingertipPlan:
             raise ValueError(f"fingertips must be (T, 2, 6, 3), not {self.fingertips.shape}")
         if self.finger_key.shape != (frames, 2, 5):
             raise ValueError(f"finger_key must be ({frames}, 2, 5), not {self.finger_key.shape}")
+        if self.joints is not None and self.joints.shape != (frames, 2, LAYOUT.hand_joints):
+            raise ValueError(f"joints must be ({frames}, 2, 27), not {self.joints.shape}")
         if self.note_hand.shape != self.note_finger.shape:
             raise ValueError("note_hand and note_finger must both have one entry per note")
         if not np.isfinite(self.fingertips).all():

@@ -76,6 +76,8 @@ class HandPaths:
         fingertips: (T, 2, 6, 3) points, world frame [m]; z is 0 for fingers that press. It is
             written into: after the frames that are planned come those that were looked ahead at,
             whose points are not final, and then hands at rest.
+        joints: (T, 2, 27) joint positions that have these points [rad, m], but for the depth of
+            fingers that press; written into likewise.
         planned: number of frames that are.
     """
 
@@ -90,6 +92,7 @@ class HandPaths:
         self._problems = []
         self._before = [np.zeros((2, LAYOUT.hand_joints)) for _ in SIDES]
         self.fingertips: NDArray[np.float64] = np.empty((len(finger_key), 2, POINT_COUNT, 3))
+        self.joints: NDArray[np.float64] = np.zeros((len(finger_key), 2, LAYOUT.hand_joints))
         self.planned = 0
         for index, side in enumerate(SIDES):
             targets, weights, clearance = _targets(finger_key[:, index], self._config)
@@ -124,6 +127,7 @@ class HandPaths:
             points = parts[index].hand.points_along(path[1:])
             points[:, 1:, 2][self._pressing[first:end, index]] = 0.0
             self.fingertips[first:end, index] = points
+            self.joints[first:end, index] = path[1:]
             self._before[index] = path[stop - first - 1 : stop - first + 1]
         self.planned = stop
 

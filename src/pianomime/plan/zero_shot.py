@@ -60,13 +60,14 @@ class GrowingPlan:
 
     @property
     def plan(self) -> FingertipPlan:
-        """The plan so far; its `fingertips` are written into, see `HandPaths.fingertips`."""
+        """The plan so far; what `HandPaths` has of it is written into."""
         return FingertipPlan(
             self._paths.fingertips,
             self._finger_key,
             self._fingering.hand,
             self._fingering.finger,
             self._strikes,
+            self._paths.joints,
         )
 
     @property

@@ -10,10 +10,13 @@ from pianomime.track.controller import (
 from pianomime.track.dynamic import DynamicConfig, DynamicTracker
 from pianomime.track.ik import IkConfig, IkTracker
 from pianomime.track.keystroke import KeystrokeConfig, KeystrokeTracker
-from pianomime.track.note_sampling import NoteSamplingConfig, NoteSamplingTracker
-from pianomime.track.predictive_sampling import PredictiveSamplingConfig, PredictiveSamplingTracker
 from pianomime.track.rehearsal import RehearsalConfig, RehearsedTracker
 from pianomime.track.replay import ReplayTracker
+from pianomime.track.sampling.note_sampling import NoteSamplingConfig, NoteSamplingTracker
+from pianomime.track.sampling.predictive_sampling import (
+    PredictiveSamplingConfig,
+    PredictiveSamplingTracker,
+)
 from pianomime.track.tracker import BatchTracker, Tracker
 
 __all__ = [

@@ -7,7 +7,7 @@ needs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import mujoco
 import numpy as np
@@ -24,7 +24,7 @@ from pianomime.plan.joint_path import (
 )
 from pianomime.progress import Steps
 from pianomime.track.finger_feedback import lift_joints, reach_joints, shared
-from pianomime.validation import finite
+from pianomime.validation import finite, whole_numbers, within
 from pianomime.world import World
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT, POINT_COUNT
@@ -46,6 +46,9 @@ class DynamicConfig:
     """Settings of the dynamic tracker."""
 
     path: PathConfig = field(default_factory=PathConfig)
+    """Weights of the joint path, and Gauss-Newton steps to it from the home pose."""
+    refine: int = 4
+    """Gauss-Newton steps to it where the plan has joint positions to begin from."""
     depth: float = 0.018
     """Depth below the top of the resting key at which a pressing fingertip aims [m]."""
     force: float = 5.0
@@ -66,7 +69,9 @@ class DynamicConfig:
     """Height above the keys to which such fingertips are lifted [m]."""
 
     def __post_init__(self) -> None:
+        whole_numbers(self)
         finite(self)
+        within("refine", self.refine, 1)
 
 
 class DynamicTracker:
@@ -104,15 +109,19 @@ class DynamicController:
         self._tips = []
         self._feedforward = np.empty((len(plan), LAYOUT.ctrl_size))
         self._press = []
+        guess, solving = plan.joints, config.path
+        if guess is not None:
+            solving = replace(solving, iterations=config.refine)
         # Beside the path: its points, the torques of the motion and those of the presses.
-        steps = Steps("controls", len(SIDES) * (config.path.iterations + 3) * len(plan))
+        steps = Steps("controls", len(SIDES) * (solving.iterations + 3) * len(plan))
         for index, hand in enumerate(self._hands):
             pressing = plan.finger_key[:, index] >= 0
             targets, weights = self._targets(plan.fingertips[:, index], plan.finger_key[:, index])
             clearance = np.full(pressing.shape, np.nan)
             start = np.zeros(LAYOUT.hand_joints)
-            problem = PathProblem(hand, start, targets, weights, clearance, config.path)
-            path = smooth_path(problem, steps.advance)
+            problem = PathProblem(hand, start, targets, weights, clearance, solving)
+            begin = None if guess is None else guess[:, index]
+            path = smooth_path(problem, steps.advance, begin)
             self._paths.append(path)
             self._tips.append(hand.points_along(path)[:, 1:])
             steps.advance(len(plan))

@@ -90,11 +90,12 @@ class Hand:
         Returns:
             (T, 6, 3) wrist, then fingertips, thumb first [m].
         """
-        points = np.empty((len(path), *self.data.site_xpos.shape))
+        qpos, sites = self.data.qpos, self.data.site_xpos
+        points = np.empty((len(path), *sites.shape))
         for row, pose in enumerate(path):
-            self.data.qpos[:] = pose
+            qpos[:] = pose
             mujoco.mj_kinematics(self.model, self.data)
-            points[row] = self.data.site_xpos
+            points[row] = sites
         return points[:, self._sites]
 
     def points_and_jacobians(
@@ -112,12 +113,13 @@ class Hand:
         points = np.empty((len(path), *data.site_xpos.shape))
         axes = np.empty((len(path), *data.cdof.shape))
         centre = np.empty((len(path), 3))
+        # Asked for once: MuJoCo makes a new array of its numbers each time.
+        qpos, sites, motion, masses = data.qpos, data.site_xpos, data.cdof, data.subtree_com
         for row, pose in enumerate(path):
-            data.qpos[:] = pose
+            qpos[:] = pose
             mujoco.mj_kinematics(self.model, data)
             mujoco.mj_comPos(self.model, data)
-            points[row], axes[row] = data.site_xpos, data.cdof
-            centre[row] = data.subtree_com[self._root]
+            points[row], axes[row], centre[row] = sites, motion, masses[self._root]
         points = points[:, self._sites]
         # MuJoCo gives the motion about each joint as a turn, and a velocity at the hand's centre of
         # mass; what `mj_jacSite` computes of them for one frame is computed for all.

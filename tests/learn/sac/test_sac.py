@@ -8,12 +8,16 @@ from stable_baselines3 import SAC
 
 from pianomime import load_player
 from pianomime.errors import InputError
+from pianomime.learn.envs.reward import press_reward
+from pianomime.learn.envs.sb3_multi_song import PlayedFrame
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.sac import training
 from pianomime.learn.sac.config import SacConfig
 from pianomime.learn.sac.training import ACTION_SCALE, GoalSong, SacVecEnv, train_sac
 from pianomime.policies.methods import WEIGHTS
 from pianomime.policies.network_file import load_network
+from pianomime.world.hand import hand_points
+from pianomime.world.parameters import key_centres
 
 SMALL = SacConfig(
     total_steps=200,
@@ -46,6 +50,25 @@ def test_an_action_moves_an_actuator_by_its_step(two_notes):
     np.testing.assert_allclose(np.delete(moved, 7, axis=1), 0.0)
 
 
+@pytest.mark.parametrize("reach", [0.0, 2.0])
+def test_the_reward_is_the_papers_and_a_term_for_fingers_that_are_near(two_notes, reach):
+    config = replace(SMALL, hit=0.75, reach=reach)
+    env = SacVecEnv([GoalSong.of(two_notes.score)], config, 1)
+    env.reset()
+    goal = np.zeros((2, 88), bool)
+    tips = hand_points(env.worlds.qpos_hands)[:, :, 1:]
+    under = int(np.abs(key_centres()[:, 1] - tips[0, 1, 2, 1]).argmin())
+    goal[0, under] = goal[1, 87] = True
+    silent = np.zeros((2, 88))
+    played = PlayedFrame(env.rows, goal, silent > 0, silent)
+    (near,), (far,) = env.rewards(played, np.zeros((2, 1, 46)))
+    # No wrong key is a quarter; a key that stays up is next to nothing.
+    pressed = 0.75 * press_reward(silent, silent > 0, goal, 1.0)
+    assert near == pytest.approx(0.25 + pressed[0] + reach, abs=0.1 * reach + 1e-9)
+    assert far - 0.25 - pressed[1] == pytest.approx(0.0, abs=0.5 * reach + 1e-9)
+    assert (near > far) == (reach > 0)
+
+
 def test_what_was_trained_plays(two_notes, tmp_path, monkeypatch):
     songs = tmp_path / "songs"
     songs.mkdir()
@@ -76,10 +99,10 @@ def test_a_file_of_another_training_is_not_taken_for_the_result(two_notes, tmp_p
     load_network(train_sac([songs], out, SMALL, 1))
 
 
-@pytest.mark.parametrize("buffer", [400, 60])
-def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monkeypatch, buffer):
+@pytest.mark.parametrize("changes", [{}, {"buffer_size": 60}, {"algorithm": "tqc", "reach": 0.5}])
+def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monkeypatch, changes):
     """Also when frames that were played first are forgotten again."""
-    songs, config = tmp_path / "songs", replace(SMALL, buffer_size=buffer)
+    songs, config = tmp_path / "songs", replace(SMALL, **changes)
     songs.mkdir()
     two_notes.score.to_midi(songs / "one.mid")
     monkeypatch.setattr(training, "_CHECKPOINT_STEPS", 50)
@@ -115,7 +138,7 @@ def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch):
             super().__init__(policy, env, **settings)
             kept.append((self, env))
 
-    monkeypatch.setattr(training, "SAC", Kept)
+    monkeypatch.setitem(training._ALGORITHMS, "sac", Kept)
     made = train_sac([songs], tmp_path / "out", SMALL, 1)
     (model, env), (run, _) = kept[0], load_network(made)
     scaled = env.agent_observations()[:, 0]
@@ -127,7 +150,16 @@ def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "change", [{"total_steps": 80}, {"buffer_size": 4}, {"gamma": -0.1}, {"hidden": (16, 0)}]
+    "change",
+    [
+        {"total_steps": 80},
+        {"buffer_size": 4},
+        {"gamma": -0.1},
+        {"hit": 1.5},
+        {"reach": -1.0},
+        {"algorithm": "ppo"},
+        {"hidden": (16, 0)},
+    ],
 )
 def test_settings_out_of_range_are_refused(change):
     with pytest.raises(InputError):

@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.learn.envs.config import RewardConfig
 from pianomime.learn.envs.state import EnvState
+from pianomime.world.parameters import key_centres
 
 KEY_BOUND, KEY_MARGIN = 0.05, 0.5
 """Shares of a key's way down: what may be missing at no loss, and over which the reward then falls
 to 0.1."""
 TIP_BOUND, TIP_MARGIN = 0.01, 0.05
 """[m] The same for a fingertip's distance from its target, seen from above."""
+REACH_BOUND, REACH_MARGIN = 0.005, 0.15
+"""[m] The same for the way from a goal key to the nearest fingertip."""
 
 _AT_MARGIN = 0.1
 
@@ -138,6 +141,24 @@ def mimic_reward(tips: NDArray[np.float64], targets: NDArray[np.float64]) -> NDA
     distance = np.sqrt(((tips - targets)[..., :2] ** 2).sum(axis=-1))
     reward: NDArray[np.float64] = tolerance(distance, TIP_BOUND, TIP_MARGIN).mean(axis=(1, 2))
     return reward
+
+
+def reach_reward(tips: NDArray[np.float64], goal: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(B,) 0..1 for a fingertip at each goal key; 1 in a frame without any.
+
+    Only the way along the keyboard counts. Any finger will do, as with the fingers that RP1M finds
+    (Zhao et al., 2024), but one may serve several keys.
+
+    Args:
+        tips: (B, 2, 5, 3) fingertips [m].
+        goal: (B, 88) bool, the keys that should sound.
+    """
+    along = tips[..., 1].reshape(len(tips), -1)
+    away = np.abs(along[:, None] - key_centres()[:, 1, None]).min(axis=2)
+    near = tolerance(away, REACH_BOUND, REACH_MARGIN)
+    due = goal.sum(axis=1)
+    reward: NDArray[np.float64] = np.where(goal, near, 0.0).sum(axis=1) / np.maximum(due, 1)
+    return np.where(due > 0, reward, 1.0)
 
 
 def _press(state: EnvState, hit: float) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ from pianomime.track import (
     ReplayTracker,
     Tracker,
 )
-from pianomime.track.predictive_sampling import PredictiveSamplingController
+from pianomime.track.sampling.predictive_sampling import PredictiveSamplingController
 
 
 def search_trajectory(run: ExpertRun, threads: int, progress: Progress) -> None:

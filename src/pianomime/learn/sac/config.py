@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from pianomime.keyboard import EXCERPT_SECONDS
-from pianomime.validation import above_zero, whole_numbers, widths, within
+from pianomime.validation import above_zero, one_of, whole_numbers, widths, within
 
 
 @dataclass(frozen=True)
 class SacConfig:
     """Soft actor-critic (Haarnoja et al., 2018) on many songs (paper, appendix G)."""
 
+    algorithm: Literal["sac", "tqc"] = "sac"
+    """The paper's, or truncated quantile critics (Kuznetsov et al., 2020), which go on from it."""
     total_steps: int = 500_000
     """Control steps in all environments together."""
     num_envs: int = 32
@@ -28,6 +31,11 @@ class SacConfig:
     """Widths of the hidden layers, in the actor and in the critics."""
     gamma: float = 0.9
     """Discount factor of the rewards per control step."""
+    hit: float = 0.5
+    """Share of the reward that is given for goal keys; the rest is for no wrong key (paper, table
+    3)."""
+    reach: float = 0.0
+    """Weight of a term that the paper does not have: how near to each goal key a fingertip is."""
     seconds: float = EXCERPT_SECONDS
     """Longest excerpt of each song [s]."""
     seed: int = 0
@@ -40,7 +48,10 @@ class SacConfig:
         within("buffer_size", self.buffer_size, self.batch_size)
         for name in ("learning_rate", "seconds"):
             above_zero(name, getattr(self, name))
-        within("gamma", self.gamma, 0, 1)
+        one_of("algorithm", self.algorithm, ("sac", "tqc"))
+        for name in ("gamma", "hit"):
+            within(name, getattr(self, name), 0, 1)
+        within("reach", self.reach, 0)
         within("seed", self.seed, 0)
         widths("hidden", self.hidden)
         within("total_steps", self.total_steps, self.learning_starts + 1)

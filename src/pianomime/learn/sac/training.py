@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from sb3_contrib import TQC
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
@@ -21,7 +22,7 @@ from pianomime.files import files_digest
 from pianomime.keyboard import KEYS
 from pianomime.learn.envs.checkpoint_callback import ResumableCallback
 from pianomime.learn.envs.reference import load_score
-from pianomime.learn.envs.reward import press_reward
+from pianomime.learn.envs.reward import press_reward, reach_reward
 from pianomime.learn.envs.sb3_multi_song import PlayedFrame, Sb3MultiSongEnv
 from pianomime.learn.imitation.export import export_network
 from pianomime.learn.imitation.normalizer import StandardNormalizer
@@ -45,6 +46,7 @@ ACTION_SCALE = by_actuator(finger=0.3, wrist=0.3, slide=0.06)
 """(46,) [rad, m] added for an action of 1 to the control that holds the present pose."""
 _NORMALIZER_STEPS = 64
 """Control steps, in all environments, that the normalizer of observations is fitted to."""
+_ALGORITHMS: dict[str, type[SAC] | type[TQC]] = {"sac": SAC, "tqc": TQC}
 _CHECKPOINT_STEPS = 50_000
 """Control steps between checkpoints, about; the whole replay buffer is in them."""
 _LOG_STEPS = 200
@@ -52,8 +54,6 @@ _LOG_STEPS = 200
 _BUFFER = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 _GOAL_SIZE = CHUNK * KEYS
 _VECTOR_SIZE = 2 * LAYOUT.hands_size + KEYS + POINTS_SIZE
-_HIT = 0.5
-"""Share of the reward for goal keys; the rest is for no wrong key (paper, table 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ class SacVecEnv(Sb3MultiSongEnv):
 
     Args:
         songs: songs to play.
-        config: number of worlds.
+        config: number of worlds, and the reward.
         threads: how many worlds step at the same time; 0 for one on each core.
     """
 
@@ -92,6 +92,7 @@ class SacVecEnv(Sb3MultiSongEnv):
         silence = np.zeros((CHUNK, KEYS), bool)
         self.normalizer: StandardNormalizer | None = None
         self._goals = [np.vstack([song.goal, silence]) for song in songs]
+        self._hit, self._reach = config.hit, config.reach
         self._holding = np.zeros((config.num_envs, LAYOUT.ctrl_size))
         super().__init__(
             songs, config.num_envs, 1, _GOAL_SIZE + _VECTOR_SIZE, LAYOUT.ctrl_size, threads
@@ -118,7 +119,10 @@ class SacVecEnv(Sb3MultiSongEnv):
 
     def rewards(self, played: PlayedFrame, actions: NDArray[Any]) -> NDArray[np.float64]:
         """As `Sb3MultiSongEnv.rewards`: the paper's press term; there are no targets to mimic."""
-        reward = press_reward(played.key_state, played.pressed, played.goal, _HIT)
+        reward = press_reward(played.key_state, played.pressed, played.goal, self._hit)
+        if self._reach:
+            tips = hand_points(self.worlds.qpos_hands)[:, :, 1:]
+            reward += self._reach * reach_reward(tips, played.goal)
         return reward[:, None]
 
 
@@ -170,7 +174,7 @@ def train_sac(
         songs = [GoalSong.of(load_score(path, 0.0, config.seconds)) for path in paths]
         env = SacVecEnv(songs, config, threads)
         normalizer = env.normalizer = _fit_normalizer(env, config.seed)
-        model = SAC(
+        model = _ALGORITHMS[config.algorithm](
             "MlpPolicy",
             env,
             learning_rate=config.learning_rate,
@@ -223,8 +227,8 @@ class _Callback(ResumableCallback):
         self._rewards: list[float] = []
 
     @property
-    def _learner(self) -> SAC:
-        assert isinstance(self.model, SAC)
+    def _learner(self) -> SAC | TQC:
+        assert isinstance(self.model, SAC | TQC)
         return self.model
 
     def arrays(self) -> Arrays:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS, KEYS
-from pianomime.track.note_cost import Frame, NoteCost, strikes_in
-from pianomime.track.note_rollouts import Rollouts, Start
+from pianomime.track.sampling.cost import Cost, Frame, strikes_in
+from pianomime.track.sampling.rollouts import Rollouts, Start
 from pianomime.world import World
 from pianomime.world.perturbation import Perturbation
 
@@ -49,7 +49,7 @@ class PerturbedCopy:
         self,
         perturbation: Perturbation,
         world: str,
-        cost: NoteCost,
+        cost: Cost,
         goal: NDArray[np.bool_],
         most: int,
         threads: int,

@@ -12,9 +12,10 @@ from heard import notes, plan_of
 from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.plan import FingertipPlan
 from pianomime.track import KeystrokeTracker
-from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
-from pianomime.track.note_rollouts import Rollouts, keys_of
-from pianomime.track.perturbed_copies import COPIES
+from pianomime.track.sampling.cost import Frame, strikes_in
+from pianomime.track.sampling.note_cost import NoteCost, NoteCostConfig
+from pianomime.track.sampling.perturbed_copies import COPIES
+from pianomime.track.sampling.rollouts import Rollouts, keys_of
 from pianomime.world import World
 from pianomime.world.key_sensor import NOTHING
 from pianomime.world.layout import LAYOUT

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan.strikes import Strikes
+from pianomime.track.sampling.cost import Frame, Strike
 from pianomime.validation import above_zero, finite
-from pianomime.world.key_sensor import KeyEvents
 from pianomime.world.touch import Touch
 
 _OPEN = 0.05
@@ -46,27 +45,6 @@ class NoteCostConfig:
         above_zero("match", self.match)
 
 
-class Strike(NamedTuple):
-    """A key that sounded, as opposed to `Strikes`, which are to sound.
-
-    Attributes:
-        key: 0..87.
-        time: from the beginning of the plan [s].
-        speed: of the key's front edge [m/s].
-    """
-
-    key: int
-    time: float
-    speed: float
-
-
-class Frame(NamedTuple):
-    """What was heard in a frame, and which keys (88,) were down at its end."""
-
-    strikes: list[Strike]
-    pressed: NDArray[np.bool_]
-
-
 class NoteCost:
     """The cost of what is heard, given what was heard before.
 
@@ -76,6 +54,8 @@ class NoteCost:
         touch: the map from the speed of a key to velocity.
         config: costs.
     """
+
+    short = 0.01
 
     def __init__(
         self, strikes: Strikes, goal: NDArray[np.bool_], touch: Touch, config: NoteCostConfig
@@ -119,13 +99,13 @@ class NoteCost:
             (min(max(step, 0), len(frames) - 1), key) for step, key in tally.missed()
         ]
 
-    def tally(self, first: int) -> Tally:
+    def tally(self, first: int) -> NoteTally:
         """The cost of frames that are added one after the other.
 
         Args:
             first: number of the first frame.
         """
-        return Tally(self, first)
+        return NoteTally(self, first)
 
     def _wanted(self, strike: Strike, done: set[int]) -> int | None:
         """The strike that this one is: the nearest of its key that has not come yet."""
@@ -151,7 +131,7 @@ class NoteCost:
         return [wanted for wanted in range(*between.tolist()) if wanted not in done]
 
 
-class Tally:
+class NoteTally:
     """The cost of some frames, as they are heard.
 
     Attributes:
@@ -221,16 +201,3 @@ class Tally:
         """The costs of strikes that should have come before [s]."""
         missing = self._of._open(self._first, end, self._done)
         return [self._of._missed[wanted] for wanted in missing]
-
-
-def strikes_in(events: KeyEvents, begin: float, world: int = 0) -> list[Strike]:
-    """The keys of a world that began to sound.
-
-    Args:
-        events: of one step.
-        begin: when the step began [s].
-        world: index of the world.
-    """
-    on = events.on & (events.world == world)
-    columns = (events.key[on], begin + events.time[on], events.speed[on])
-    return [Strike(*row) for row in zip(*map(np.ndarray.tolist, columns), strict=True)]

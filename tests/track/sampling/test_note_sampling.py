@@ -22,10 +22,11 @@ from pianomime.track import (
     controls_per_frame,
 )
 from pianomime.track.keystroke import KeystrokeController
-from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
-from pianomime.track.perturbed_copies import COPIES
+from pianomime.track.sampling.cost import Frame, strikes_in
+from pianomime.track.sampling.note_cost import NoteCost, NoteCostConfig
+from pianomime.track.sampling.perturbed_copies import COPIES
+from pianomime.track.sampling.variations import Variations
 from pianomime.track.strokes import StrokeConfig
-from pianomime.track.variations import Variations
 from pianomime.world import World
 from pianomime.world.touch import TOUCHES
 

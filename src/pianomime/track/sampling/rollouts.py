@@ -1,4 +1,4 @@
-"""Roll-outs of controls, from which note sampling takes the best; what has lost is not rolled out.
+"""Roll-outs of controls, from which the best are taken; what has lost is not rolled out.
 
 The cost of a roll-out only grows. As soon as it exceeds that of the best known, the roll-out ends,
 which changes nothing but the time it takes. Where one hand alone is varied, and the other is far
@@ -18,15 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS, KEYS
-from pianomime.track.note_cost import Frame, NoteCost, Strike, strikes_in
+from pianomime.track.sampling.cost import Cost, Frame, Strike, strikes_in
 from pianomime.world import World, WorldBatch
 from pianomime.world.hand import hand_points
 from pianomime.world.one_hand import one_hand_model, state_of_one_hand
 from pianomime.world.parameters import key_centres
 from pianomime.world.perturbation import Perturbation
 
-_SHORT = 0.01
-"""Cost of a key's way to where it should be: keys that are nearly right are better."""
 _BROKEN = 100.0
 """Cost of physics that breaks."""
 _ROUNDING = 1e-9
@@ -81,7 +79,7 @@ class Rollouts:
 
     def __init__(
         self,
-        cost: NoteCost,
+        cost: Cost,
         goal: NDArray[np.bool_],
         most: int,
         threads: int,
@@ -173,7 +171,7 @@ class Rollouts:
             self.steps += len(left)
             self.alone += len(left) * start.alone
             away = np.abs(batch.key_state[left] - self._goal[first + step])
-            short[left] += _SHORT * np.where(start.mine, away, 0.0).sum(axis=1)
+            short[left] += self._cost.short * np.where(start.mine, away, 0.0).sum(axis=1)
             for index, frame in zip(left, self._frames(start, step, left), strict=True):
                 played[index].append(frame)
                 tallies[index].add(frame)

@@ -12,9 +12,10 @@ from heard import notes, plan_of, play
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.track import KeystrokeTracker, NoteSamplingConfig, NoteSamplingTracker
-from pianomime.track.note_cost import Frame, NoteCost, NoteCostConfig, strikes_in
-from pianomime.track.note_sampling import NoteSamplingController
-from pianomime.track.perturbed_copies import COPIES, PerturbedCopy
+from pianomime.track.sampling.cost import Frame, strikes_in
+from pianomime.track.sampling.note_cost import NoteCost, NoteCostConfig
+from pianomime.track.sampling.perturbed_copies import COPIES, PerturbedCopy
+from pianomime.track.sampling.predictive_sampling import PredictiveSamplingController
 from pianomime.world import World
 from pianomime.world.perturbation import Perturbation, PerturbedWorld
 from pianomime.world.touch import TOUCHES
@@ -30,7 +31,7 @@ def leaps(seed: int, count: int = 8) -> FingertipPlan:
     return plan_of(notes(key, np.tile(np.arange(count) * 0.3, 2), 0.2))
 
 
-def sampling(plan: FingertipPlan, copies: int) -> NoteSamplingController:
+def sampling(plan: FingertipPlan, copies: int) -> PredictiveSamplingController:
     config = replace(CONFIG, copies=copies)
     return NoteSamplingTracker(KeystrokeTracker(), config, threads=1).start(plan)
 
