@@ -24,7 +24,7 @@ from pianomime.players.registry import EFFORT
 from pianomime.songs.find import find_songs
 
 
-def play(song: Path, seconds: float, effort: int, cores: list[int]) -> dict[str, Any]:
+def play(song: Path, seconds: float, player: str, effort: int, cores: list[int]) -> dict[str, Any]:
     """The measurements of one song, or its error."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder, "out")
@@ -33,7 +33,7 @@ def play(song: Path, seconds: float, effort: int, cores: list[int]) -> dict[str,
             [
                 *(sys.executable, "-m", "pianomime", "play", str(song), "-o", str(out)),
                 *("--lead-in", "0", "--seconds", str(seconds)),
-                *("--effort", str(effort)),
+                *("--player", player, "--effort", str(effort)),
             ],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -65,6 +65,7 @@ def main() -> None:
     options.add_argument(
         "--seconds", type=float, default=EXCERPT_SECONDS, help="of each song (%(default)s)"
     )
+    options.add_argument("--player", default="zero-shot", help="who plays (%(default)s)")
     options.add_argument("--rounds", type=int, default=1)
     options.add_argument("--effort", type=int, default=EFFORT, help="0 to 3 (%(default)s)")
     options.add_argument("--cores", type=int, default=1, help="to play on (%(default)s)")
@@ -78,7 +79,8 @@ def main() -> None:
     rows = []
     for file in files:
         runs = [
-            play(file, arguments.seconds, arguments.effort, cores) for _ in range(arguments.rounds)
+            play(file, arguments.seconds, arguments.player, arguments.effort, cores)
+            for _ in range(arguments.rounds)
         ]
         failed = [run for run in runs if "error" in run]
         rows.append(failed[0] if failed else _median(runs))
@@ -95,7 +97,7 @@ def main() -> None:
     for row in rows:
         if "error" in row:
             print(f"{row['song']}: {row['error']}")
-    settings = {name: getattr(arguments, name) for name in ("seconds", "effort", "cores")}
+    settings = {name: getattr(arguments, name) for name in ("seconds", "player", "effort", "cores")}
     common.report(arguments.output, facts, {**settings, "songs": rows})
 
 

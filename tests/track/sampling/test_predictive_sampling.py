@@ -15,6 +15,7 @@ from pianomime.track import (
     PredictiveSamplingTracker,
     Tracker,
 )
+from pianomime.track.sampling.predictive_sampling import SOLID_APART
 from pianomime.world import World
 
 QUICK = PredictiveSamplingConfig(variations=12)
@@ -109,3 +110,11 @@ def test_an_imagined_disaster_is_no_warning(plan: FingertipPlan) -> None:
         for frame in range(12):
             world.step(controller.control(frame, world))
     assert world.blow_ups == 0
+
+
+def test_hands_that_do_not_pass_through_each_other_are_simulated_together_when_near() -> None:
+    tracker = DynamicTracker()
+    assert PredictiveSamplingTracker(tracker).config.apart == 0.0
+    assert PredictiveSamplingTracker(tracker, world="solid").config.apart == SOLID_APART
+    wide = PredictiveSamplingConfig(apart=0.1)
+    assert PredictiveSamplingTracker(tracker, wide, world="solid").config.apart == 0.1

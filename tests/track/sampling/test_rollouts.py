@@ -117,17 +117,20 @@ def test_in_perturbed_copies_the_mean_cost_is_added_and_losers_are_not_rolled_ou
 
 @pytest.mark.parametrize("perturbation", [None, COPIES[0]])
 @pytest.mark.parametrize("hand", [0, 1])
-def test_one_hand_alone_is_heard_as_both_are(hand: int, perturbation: Perturbation | None) -> None:
+@pytest.mark.parametrize("near", [False, True])
+def test_one_hand_alone_is_heard_as_both_are(
+    hand: int, near: bool, perturbation: Perturbation | None
+) -> None:
     _, world, ctrl, known, hands = scene()
     found = rollouts(4, perturbation)
     start = found.start(FIRST, world, known)
     # What both do there is what the other hand does while one is varied.
     start = start._replace(known=found.best(start, ctrl[None]).heard)
-    before = found.steps
     keys = keys_of(hand, hands, 0.05)
     assert keys is not None
-    alone = found.start_alone(start, hand, keys)
-    assert found.alone == 0
+    alone = found.start_beside(start, hand, ctrl) if near else found.start_alone(start, hand, keys)
+    assert found.alone == near * FRAMES
+    before, before_alone = found.steps, found.alone
     for one in (ctrl, *varied(hand, 3)):
         both, mine = found.best(start, one[None]), found.best(alone, one[None])
         for whole, part in zip(both.heard, mine.heard, strict=True):
@@ -137,8 +140,9 @@ def test_one_hand_alone_is_heard_as_both_are(hand: int, perturbation: Perturbati
             np.testing.assert_allclose(
                 [strike.time for strike in heard], [strike.time for strike in wanted], atol=2e-3
             )
+        assert mine.cost == pytest.approx(both.cost, abs=0.02)
     assert any(frame.strikes for frame in mine.heard)
-    assert found.alone == 4 * FRAMES
+    assert found.alone - before_alone == 4 * FRAMES
     assert found.steps - before == 8 * FRAMES
 
 

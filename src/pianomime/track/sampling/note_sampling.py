@@ -13,6 +13,7 @@ from pianomime.track.rehearsal import KeystrokeStarter
 from pianomime.track.sampling.note_cost import NoteCost, NoteCostConfig
 from pianomime.track.sampling.perturbed_copies import COPIES, PerturbedCopy
 from pianomime.track.sampling.predictive_sampling import (
+    SOLID_APART,
     PredictiveSamplingConfig,
     PredictiveSamplingController,
 )
@@ -36,6 +37,9 @@ class NoteSamplingConfig(PredictiveSamplingConfig):
     """Frames that are played before looking ahead again."""
     ahead: int = 6
     """Frames that are looked ahead."""
+    apart: float = SOLID_APART
+    """Distance between the fingers of both hands along the keyboard from which on a hand that alone
+    is varied is simulated alone [m]."""
     trigger: float = 0.6
     """Cost of the next frames above which variations are tried; also where a note is wrong."""
     copies: int = 0

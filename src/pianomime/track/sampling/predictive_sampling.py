@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,9 @@ from pianomime.world import World
 from pianomime.world.layout import LAYOUT
 from pianomime.world_names import PAPER
 
+SOLID_APART = 0.04
+"""[m] Distance from which on hands that do not pass through each other do not touch."""
+
 
 @dataclass(frozen=True)
 class PredictiveSamplingConfig(VariationConfig):
@@ -46,14 +49,16 @@ class PredictiveSamplingConfig(VariationConfig):
     """Frames that are played before looking ahead again."""
     ahead: int = 8
     """Frames that are looked ahead."""
-    apart: float = 0.04
+    apart: float = 0.0
     """Distance between the fingers of both hands along the keyboard from which on a hand that alone
-    is varied is simulated alone [m]."""
+    is varied is simulated alone [m]; 0 for however near they are, which counts as `SOLID_APART`
+    in worlds in which they do not pass through each other."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("rounds", "commit", "ahead"):
             within(name, getattr(self, name), 1)
+        within("apart", self.apart, 0.0)
 
     @classmethod
     def of_effort(cls, effort: int) -> PredictiveSamplingConfig:
@@ -84,7 +89,10 @@ class PredictiveSamplingTracker:
         threads: int = 0,
         world: str = PAPER,
     ) -> None:
-        self.config = config or PredictiveSamplingConfig()
+        config = config or PredictiveSamplingConfig()
+        if world != PAPER and not config.apart:
+            config = replace(config, apart=SOLID_APART)
+        self.config = config
         self._tracker, self._goal, self._threads = tracker, goal, threads
         self._world = world
 
@@ -235,14 +243,15 @@ class PredictiveSamplingController:
         """
         rollouts = [self._rollouts, *(copy.rollouts for copy in self.copies)]
         varied = [hand for hand, range_ in enumerate(LAYOUT.actuators) if probability[range_].any()]
-        if len(varied) == 1:
+        each = list(zip(rollouts, starts, strict=True))
+        if len(varied) == 1 and not self.config.apart:
+            base = np.array([step.ctrl for step in known])
+            starts = [world.start_beside(start, varied[0], base) for world, start in each]
+        elif len(varied) == 1:
             hands = np.array([step.hands for step in known])
             keys = keys_of(varied[0], hands, self.config.apart)
             if keys is not None:
-                starts = [
-                    each.start_alone(start, varied[0], keys)
-                    for each, start in zip(rollouts, starts, strict=True)
-                ]
+                starts = [world.start_alone(start, varied[0], keys) for world, start in each]
         start, copies = starts[0], list(zip(rollouts, starts, strict=True))[1:]
         best = self._rollouts.best(start, np.array([[step.ctrl for step in known]]), copies=copies)
         for _ in range(self.config.rounds):

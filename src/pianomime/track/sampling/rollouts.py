@@ -2,7 +2,8 @@
 
 The cost of a roll-out only grows. As soon as it exceeds that of the best known, the roll-out ends,
 which changes nothing but the time it takes. Where one hand alone is varied, and the other is far
-from it, only that hand is simulated, and the keys of the other do what they are known to do.
+from it, only that hand is simulated, and the keys of the other do what they are known to do. Where
+hands pass through each other it may be near: it is simulated by itself, once.
 Controls may be rolled out in perturbed copies of the world, too; what has lost in it is not.
 """
 
@@ -39,6 +40,13 @@ class Outcome(NamedTuple):
     heard: list[Frame]
 
 
+class _OtherHand(NamedTuple):
+    """What a hand did in a frame, and how far down (88,) each key was at its end, 0..1."""
+
+    frame: Frame
+    key_state: NDArray[np.float64]
+
+
 class Start(NamedTuple):
     """Whence controls are rolled out.
 
@@ -50,6 +58,7 @@ class Start(NamedTuple):
         mine: (88,) bool: keys that are simulated; the others do what is known.
         known: what is known of each frame.
         alone: whether one hand alone is simulated.
+        other: what the other hand does to the keys in each frame, where it is simulated by itself.
     """
 
     first: int
@@ -59,6 +68,7 @@ class Start(NamedTuple):
     mine: NDArray[np.bool_]
     known: Sequence[Frame]
     alone: bool
+    other: Sequence[_OtherHand] | None = None
 
 
 class Rollouts:
@@ -119,6 +129,29 @@ class Rollouts:
         state = state_of_one_hand(start.state, hand, self._world)
         return start._replace(batch=self._of_hand(hand), state=state, mine=keys, alone=True)
 
+    def start_beside(self, start: Start, hand: int, ctrl: NDArray[np.float64]) -> Start:
+        """One hand alone, however near the other one is, which does by itself what is known.
+
+        A key that both press goes with the one that presses it further.
+
+        Args:
+            start: of both hands.
+            hand: 0 left, 1 right.
+            ctrl: (H, S, 46) controls of the other hand.
+        """
+        other = self.start_alone(start, 1 - hand, start.mine)
+        first, left = np.zeros(1, np.int64), other.batch
+        left.set_state(other.state, first)
+        left.sounding[first] = start.sounding
+        seen = []
+        for step, target in enumerate(ctrl):
+            left.step(target[None], ids=first)
+            (frame,) = self._frames(other, step, first)
+            seen.append(_OtherHand(frame, left.key_state[0].copy()))
+        self.steps += len(ctrl)
+        self.alone += len(ctrl)
+        return self.start_alone(start, hand, start.mine)._replace(other=seen)
+
     def best(
         self,
         start: Start,
@@ -170,7 +203,10 @@ class Rollouts:
             batch.step(tries[left, step], ids=left)
             self.steps += len(left)
             self.alone += len(left) * start.alone
-            away = np.abs(batch.key_state[left] - self._goal[first + step])
+            down = batch.key_state[left]
+            if start.other is not None:
+                down = np.maximum(down, start.other[step].key_state)
+            away = np.abs(down - self._goal[first + step])
             short[left] += self._cost.short * np.where(start.mine, away, 0.0).sum(axis=1)
             for index, frame in zip(left, self._frames(start, step, left), strict=True):
                 played[index].append(frame)
@@ -191,6 +227,9 @@ class Rollouts:
         """What is heard in a frame of each of some worlds."""
         known, pressed, events = start.known[step], start.batch.pressed, start.batch.key_events
         others = [strike for strike in known.strikes if not start.mine[strike.key]]
+        if start.other is not None:
+            beside = start.other[step].frame
+            others, pressed = beside.strikes, pressed | beside.pressed
         heard: dict[int, list[Strike]] = {}
         begin = (start.first + step) * FRAME_SECONDS
         for index in np.unique(events.world).tolist():
