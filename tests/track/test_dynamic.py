@@ -161,7 +161,7 @@ def test_short_plans(make: type[DynamicTracker] | type[IkTracker], frames: int) 
 
 def test_a_path_that_begins_from_the_plan_is_better_with_fewer_steps() -> None:
     """What the planner knows of the joints gains: else they are found from the home pose."""
-    score = Score.from_midi(find_song("joplin-maple-leaf-rag")).clip(0.0, 8.0)
+    score = Score.from_midi(find_song("beethoven-fur-elise")).clip(0.0, 8.0)
     plan = ZeroShotPlanner().plan(score)
     assert plan.joints is not None
     unknown = replace(plan, joints=None)
