@@ -164,11 +164,19 @@ def test_experts_with_another_base_controller_are_refused(data, tmp_path):
         )
 
 
-def test_values_that_are_not_finite_are_refused(data, two_notes, tmp_path):
+@pytest.mark.parametrize(
+    ("column", "value", "refused"),
+    [
+        ("joints", np.nan, "joints of episode 0"),
+        ("finger_key", 99, "finger_key of odd must be -1 to 87, not 99"),
+        ("finger_key", -2, "finger_key of odd must be -1 to 87, not -2"),
+    ],
+)
+def test_values_that_cannot_be_are_refused(data, tmp_path, column, value, refused):
     columns = {name: np.zeros((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
-    columns["joints"][2] = np.nan
+    columns[column][2] = value
     write_trajectories(tmp_path / "odd.zarr", iter([Episode("odd", 0.0, "ik", columns)]))
-    with pytest.raises(InputError, match="joints of episode 0"):
+    with pytest.raises(InputError, match=refused):
         train_policy(
             "bc-mse", policy_config("bc-mse"), tmp_path, None, [tmp_path / "odd.zarr"], None
         )

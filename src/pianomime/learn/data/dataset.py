@@ -17,6 +17,7 @@ from pianomime.errors import InputError
 from pianomime.learn.data.published import read_published
 from pianomime.learn.data.trajectories import TrajectoryData, check_one_world
 from pianomime.plan.demonstration import TRAIN, Demonstration, is_demonstration
+from pianomime.plan.plan_arrays import FINGER_KEY
 from pianomime.policies.finger_assignment import flat_heights
 from pianomime.short_repr import short_repr
 from pianomime.shown import shown
@@ -173,8 +174,8 @@ def trajectory_dataset(
         base: the base controller that all must have been recorded with, if that matters.
 
     Raises:
-        InputError: a data set is not there or cannot be used, values in it are not finite, or
-            episodes were played in different worlds.
+        InputError: a data set is not there or cannot be used, values in it are not finite or no
+            keys, or episodes were played in different worlds.
     """
 
     def clips() -> Iterator[tuple[str, int, dict[str, NDArray[Any]]]]:
@@ -204,6 +205,7 @@ def _concatenate(
         for column, array in arrays.items():
             if array.dtype.kind == "f" and not np.isfinite(array).all():
                 raise InputError(f"{source}: {column} of {name} has values that are not finite")
+        FINGER_KEY.check_values(f"{source}: finger_key of {name}", arrays["finger_key"])
         # A policy is played with these: data sets of planners hold how high fingers hover, too.
         arrays["fingertips"] = flat_heights(arrays["fingertips"], arrays["finger_key"])
         names.append(name)
