@@ -32,7 +32,8 @@ from pianomime import Performance, Player, Score, evaluate, load_player
 from pianomime.players.builtin import ZERO_SHOT_20HZ
 from pianomime.players.registry import player_settings
 from pianomime.progress import Progress, no_progress
-from pianomime.track import Controller, dynamic, predictive_sampling
+from pianomime.track import Controller, dynamic
+from pianomime.track.sampling import rollouts
 from pianomime.world import WorldBatch
 
 SETS = {
@@ -173,7 +174,7 @@ def without_nearly(effort: int, seed: int) -> Player:
         def key_state(self) -> NDArray[np.float64]:
             return self.pressed.astype(float)
 
-    return Ablated(effort, seed, predictive_sampling, "WorldBatch", Batch)
+    return Ablated(effort, seed, rollouts, "WorldBatch", Batch)
 
 
 def without_penalty(effort: int, seed: int) -> Player:
@@ -183,7 +184,7 @@ def without_penalty(effort: int, seed: int) -> Player:
         def __setattr__(self, name: str, value: Any) -> None:
             super().__setattr__(name, _Nothing(value) if name == "blow_ups" else value)
 
-    return Ablated(effort, seed, predictive_sampling, "WorldBatch", Batch)
+    return Ablated(effort, seed, rollouts, "WorldBatch", Batch)
 
 
 class _Nothing:

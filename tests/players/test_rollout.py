@@ -72,7 +72,6 @@ def test_it_is_the_only_such_loop() -> None:
         ("players/rollout.py", "rollout"),
         ("track/calibration.py", "_strikes"),
         ("track/nominal_tracking.py", "settle"),
-        ("track/sampling/note_sampling.py", "_look_ahead"),
-        ("track/sampling/predictive_sampling.py", "_search"),
         ("track/rehearsal.py", "_listen"),
+        ("track/sampling/look_ahead.py", "_step"),
     ]

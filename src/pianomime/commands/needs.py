@@ -26,6 +26,7 @@ TRAIN = (
     "onnx",
     "onnxruntime",
     "safetensors",
+    "sb3_contrib",
     "stable_baselines3",
     "tensorboard",
     "torch",

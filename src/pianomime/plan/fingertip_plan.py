@@ -65,7 +65,8 @@ class FingertipPlan:
         if self.finger_key.shape != (frames, 2, 5):
             raise ValueError(f"finger_key must be ({frames}, 2, 5), not {self.finger_key.shape}")
         if self.joints is not None and self.joints.shape != (frames, 2, LAYOUT.hand_joints):
-            raise ValueError(f"joints must be ({frames}, 2, 27), not {self.joints.shape}")
+            wanted = (frames, 2, LAYOUT.hand_joints)
+            raise ValueError(f"joints must be {wanted}, not {self.joints.shape}")
         if self.note_hand.shape != self.note_finger.shape:
             raise ValueError("note_hand and note_finger must both have one entry per note")
         if not np.isfinite(self.fingertips).all():

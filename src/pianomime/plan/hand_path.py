@@ -153,7 +153,8 @@ def make_feasible(plan: FingertipPlan, config: HandPathConfig | None = None) -> 
         plan: the human's plan.
         config: heights and weights.
     """
-    return replace(plan, fingertips=hand_paths(plan.finger_key, config, plan.fingertips))
+    feasible = hand_paths(plan.finger_key, config, plan.fingertips)
+    return replace(plan, fingertips=feasible, joints=None)
 
 
 def _targets(

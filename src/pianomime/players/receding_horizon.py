@@ -124,6 +124,7 @@ class RecedingHorizonController:
             fingertips=plan.fingertips[here],
             finger_key=plan.finger_key[here],
             strikes=strikes.some_since(chosen, began),
+            joints=None,  # of no use here: strikes have their own path
         )
         # A finger that is on its key stays where it struck it.
         held = strikes.onset[chosen] < began

@@ -172,7 +172,7 @@ def test_a_search_has_the_threads_that_it_is_given(
         asked.add(threads)
         return WorldBatch(worlds, threads, **others)
 
-    monkeypatch.setattr("pianomime.track.sampling.predictive_sampling.WorldBatch", recorded)
+    monkeypatch.setattr("pianomime.track.sampling.rollouts.WorldBatch", recorded)
     one = train_expert(demo, tmp_path / "one", small_search, threads=1)
     assert asked == {1}
     two = train_expert(demo, tmp_path / "two", small_search, threads=2)

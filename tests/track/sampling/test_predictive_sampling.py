@@ -1,4 +1,5 @@
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from numpy.typing import NDArray
 from pianomime import load_player
 from pianomime.errors import InputError
 from pianomime.music import Score, frame_metrics
-from pianomime.plan import FingertipPlan, ZeroShotPlanner
+from pianomime.plan import LEFT, FingertipPlan, ZeroShotPlanner
 from pianomime.players import rollout
 from pianomime.track import (
     DynamicTracker,
@@ -15,8 +16,9 @@ from pianomime.track import (
     PredictiveSamplingTracker,
     Tracker,
 )
-from pianomime.track.sampling.predictive_sampling import SOLID_APART
+from pianomime.track.sampling import predictive_sampling
 from pianomime.world import World
+from pianomime.world.layout import LAYOUT
 
 QUICK = PredictiveSamplingConfig(variations=12)
 
@@ -112,9 +114,19 @@ def test_an_imagined_disaster_is_no_warning(plan: FingertipPlan) -> None:
     assert world.blow_ups == 0
 
 
-def test_hands_that_do_not_pass_through_each_other_are_simulated_together_when_near() -> None:
-    tracker = DynamicTracker()
-    assert PredictiveSamplingTracker(tracker).config.apart == 0.0
-    assert PredictiveSamplingTracker(tracker, world="solid").config.apart == SOLID_APART
-    wide = PredictiveSamplingConfig(apart=0.1)
-    assert PredictiveSamplingTracker(tracker, wide, world="solid").config.apart == 0.1
+def test_hands_that_do_not_pass_through_each_other_are_simulated_together_when_near(
+    plan: FingertipPlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(predictive_sampling, "SOLID_APART", 1.0)  # however they are, it is near
+    alone = []
+    for world in ("paper", "solid"):
+        config = replace(QUICK, variations=3, rounds=1)
+        tracker = PredictiveSamplingTracker(DynamicTracker(world=world), config, world=world)
+        controller, there = tracker.start(plan), World(world)
+        varied = np.zeros(LAYOUT.ctrl_size)
+        varied[LAYOUT.actuators[LEFT]] = 1.0
+        known = controller._look.frames(0, 4, there)
+        start = controller._rollouts.start(0, there, [step.frame for step in known])
+        controller._vary(known, [start], varied)
+        alone.append(controller.steps_alone)
+    assert alone[0] > 0 == alone[1]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -81,7 +81,9 @@ def load_demonstration(
         demonstration = Demonstration.load(name).excerpt(start, seconds)
     else:
         score = load_score(name, start, seconds)
-        demonstration = Demonstration(score, ZeroShotPlanner().plan(score), source="zero-shot plan")
+        # Files hold no joints: what is learned must be the same after it was saved and read.
+        plan = replace(ZeroShotPlanner().plan(score), joints=None)
+        demonstration = Demonstration(score, plan, source="zero-shot plan")
     check_demonstration(demonstration, str(name))
     return demonstration
 

@@ -39,7 +39,7 @@ class NoteSamplingConfig(PredictiveSamplingConfig):
     """Frames that are looked ahead."""
     apart: float = SOLID_APART
     """Distance between the fingers of both hands along the keyboard from which on a hand that alone
-    is varied is simulated alone [m]."""
+    is varied is simulated alone [m]; 0 as in `PredictiveSamplingConfig`."""
     trigger: float = 0.6
     """Cost of the next frames above which variations are tried; also where a note is wrong."""
     copies: int = 0

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +58,6 @@ class PredictiveSamplingConfig(VariationConfig):
         super().__post_init__()
         for name in ("rounds", "commit", "ahead"):
             within(name, getattr(self, name), 1)
-        within("apart", self.apart, 0.0)
 
     @classmethod
     def of_effort(cls, effort: int) -> PredictiveSamplingConfig:
@@ -89,10 +88,7 @@ class PredictiveSamplingTracker:
         threads: int = 0,
         world: str = PAPER,
     ) -> None:
-        config = config or PredictiveSamplingConfig()
-        if world != PAPER and not config.apart:
-            config = replace(config, apart=SOLID_APART)
-        self.config = config
+        self.config = config or PredictiveSamplingConfig()
         self._tracker, self._goal, self._threads = tracker, goal, threads
         self._world = world
 
@@ -105,7 +101,7 @@ class PredictiveSamplingTracker:
         """
         goal = plan.keys() if self._goal is None else self._goal
         base = self._tracker.start(plan)
-        if controls_per_frame(base) > 1:
+        if base.replayable and controls_per_frame(base) > 1:
             raise InputError(
                 f"predictive sampling needs one control a frame, but {type(base).__name__} gives "
                 f"{controls_per_frame(base)}: such controllers are for note sampling"
@@ -164,6 +160,8 @@ class PredictiveSamplingController:
         self.config, self.plan, self.copies = config, base.plan, list(copies)
         self._cost, self._trigger = cost, trigger
         self._parts = controls_per_frame(base)
+        # Solid hands that are near each other are never simulated alone.
+        self._apart = config.apart or (0.0 if world == PAPER else SOLID_APART)
         self._look = LookAhead(base)
         self._variations = Variations(self.plan, config)
         self._rollouts = Rollouts(cost, goal, config.variations, threads, world)
@@ -224,7 +222,7 @@ class PredictiveSamplingController:
         return chosen
 
     def _wrong(self, cost: Cost, first: int, heard: Sequence[Frame]) -> list[tuple[int, int]]:
-        """What goes wrong in a world, as of `NoteCost.of`; nothing where it is not to be varied."""
+        """What goes wrong in a world, as of `Cost.of`; nothing where it is not to be varied."""
         config, frames = self.config, len(heard)
         value, soon = cost.of(first, heard, min(config.commit + 2, frames))
         _, wrong = cost.of(first, heard, frames)
@@ -244,12 +242,12 @@ class PredictiveSamplingController:
         rollouts = [self._rollouts, *(copy.rollouts for copy in self.copies)]
         varied = [hand for hand, range_ in enumerate(LAYOUT.actuators) if probability[range_].any()]
         each = list(zip(rollouts, starts, strict=True))
-        if len(varied) == 1 and not self.config.apart:
+        if len(varied) == 1 and not self._apart:
             base = np.array([step.ctrl for step in known])
             starts = [world.start_beside(start, varied[0], base) for world, start in each]
         elif len(varied) == 1:
             hands = np.array([step.hands for step in known])
-            keys = keys_of(varied[0], hands, self.config.apart)
+            keys = keys_of(varied[0], hands, self._apart)
             if keys is not None:
                 starts = [world.start_alone(start, varied[0], keys) for world, start in each]
         start, copies = starts[0], list(zip(rollouts, starts, strict=True))[1:]

@@ -130,14 +130,15 @@ class Rollouts:
         return start._replace(batch=self._of_hand(hand), state=state, mine=keys, alone=True)
 
     def start_beside(self, start: Start, hand: int, ctrl: NDArray[np.float64]) -> Start:
-        """One hand alone, however near the other one is, which does by itself what is known.
+        """One hand alone, however near the other one is, in a world in which they do not collide.
 
-        A key that both press goes with the one that presses it further.
+        The other hand is simulated by itself once; a key is as far down as the hand that presses it
+        further has it.
 
         Args:
             start: of both hands.
             hand: 0 left, 1 right.
-            ctrl: (H, S, 46) controls of the other hand.
+            ctrl: (H, S, 46) controls, of which those of the other hand are followed.
         """
         other = self.start_alone(start, 1 - hand, start.mine)
         first, left = np.zeros(1, np.int64), other.batch
