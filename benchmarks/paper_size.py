@@ -27,6 +27,8 @@ import common
 _NAMES = ("high-diff", "low-diff", "high-bet", "low-bet")
 _FIT, _COMPARED = 512, 16
 """Samples that normalizers are fitted to, and on which outputs are compared."""
+_FEWEST = 3
+"""Updates: the first one warms up, and the last one ends with the training."""
 _KIBI, _MEBI = 2**10, 2**20
 
 
@@ -55,17 +57,17 @@ def one(name: str, data: str, updates: int) -> dict[str, Any]:
     encoder = GoalEncoder() if config.goal_encoding == "sdf" else None
     network = PolicyNetwork(config, {key: each.shape[1:] for key, each in drawn.items()}, encoder)
     network.fit_normalizers(drawn)
-    times = [time.perf_counter()]
+    times: list[float] = []
+    threads: list[int] = []
 
-    def draw(*arguments: Any) -> Any:
+    def loss(module: Any, batch: Any) -> Any:
+        """Called once an update."""
         times.append(time.perf_counter())
-        return samples.draw(*arguments)
+        threads.append(torch.get_num_threads())
+        return module(batch)
 
     with tempfile.TemporaryDirectory() as folder:
-        train_network(
-            Path(folder, name), network, lambda module, batch: module(batch), draw, trainer
-        )
-        times.append(time.perf_counter())
+        train_network(Path(folder, name), network, loss, samples.draw, trainer)
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _KIBI
         file = Path(folder, f"{name}.onnx")
         export_policy(network, policy_info(network, name), file)
@@ -88,7 +90,7 @@ def one(name: str, data: str, updates: int) -> dict[str, Any]:
         "peak_mib": peak / _MEBI,
         "file_mib": size / _MEBI,
         "difference": float(np.abs(trained - written).max() / np.abs(trained).max()),
-        "threads": torch.get_num_threads(),
+        "threads": threads[0],
     }
 
 
@@ -98,8 +100,8 @@ def main() -> None:
     options.add_argument("data", help="data set of trajectories")
     options.add_argument("--updates", type=int, default=4, help="of each network (%(default)s)")
     given = options.parse_args()
-    if given.updates < 2:
-        options.error("--updates must be 2 or more")
+    if given.updates < _FEWEST:
+        options.error(f"--updates must be {_FEWEST} or more")
     facts, rows = common.machine(), []
     common.show_machine(facts)
     for name in _NAMES:

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sb3_contrib import TQC
 from stable_baselines3 import SAC
 
 from pianomime import load_player
 from pianomime.errors import InputError
-from pianomime.learn.envs.reward import press_reward
+from pianomime.learn.envs.reward import REACH_BOUND, REACH_MARGIN, press_reward, reach_reward
 from pianomime.learn.envs.sb3_multi_song import PlayedFrame
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.sac import training
@@ -48,6 +49,17 @@ def test_an_action_moves_an_actuator_by_its_step(two_notes):
     moved = env.controls(actions) - held
     np.testing.assert_allclose(moved[:, 7], ACTION_SCALE[7])
     np.testing.assert_allclose(np.delete(moved, 7, axis=1), 0.0)
+
+
+def test_a_finger_is_near_to_each_key_by_its_place_along_the_keyboard():
+    goal, tips = np.zeros((3, 88), bool), np.zeros((3, 2, 5, 3))
+    tips[..., 1] = key_centres()[40, 1]
+    goal[0, 40] = goal[1, [40, 87]] = True
+    one, half, silent = reach_reward(tips, goal)
+    assert one == silent == 1.0
+    assert half == pytest.approx(0.5, abs=1e-3)
+    tips[..., 1] += REACH_BOUND + REACH_MARGIN
+    assert reach_reward(tips, goal)[0] == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("reach", [0.0, 2.0])
@@ -127,19 +139,22 @@ def test_a_training_that_was_stopped_comes_to_the_same(two_notes, tmp_path, monk
         np.testing.assert_array_equal(array, other[name])
 
 
-def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch):
+@pytest.mark.parametrize("algorithm", [SAC, TQC])
+def test_the_file_does_what_the_actor_does(two_notes, tmp_path, monkeypatch, algorithm):
     """Of what the environment shows, the mean of its actions, in steps of the actuators."""
     songs, kept = tmp_path / "songs", []
     songs.mkdir()
     two_notes.score.to_midi(songs / "one.mid")
 
-    class Kept(SAC):
+    name = algorithm.__name__.lower()
+
+    class Kept(algorithm):
         def __init__(self, policy, env, **settings):
             super().__init__(policy, env, **settings)
             kept.append((self, env))
 
-    monkeypatch.setitem(training._ALGORITHMS, "sac", Kept)
-    made = train_sac([songs], tmp_path / "out", SMALL, 1)
+    monkeypatch.setitem(training._ALGORITHMS, name, Kept)
+    made = train_sac([songs], tmp_path / "out", replace(SMALL, algorithm=name), 1)
     (model, env), (run, _) = kept[0], load_network(made)
     scaled = env.agent_observations()[:, 0]
     env.normalizer = None
