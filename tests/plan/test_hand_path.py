@@ -61,3 +61,12 @@ def test_left_is_right_in_a_mirror(plan: FingertipPlan) -> None:
     # Hands at rest are not the mirror images of each other about that D, so only where they press.
     np.testing.assert_allclose(paths[6:8, 0, 2, 1], centre - paths[6:8, 1, 2, 1], atol=0.002)
     np.testing.assert_allclose(paths[6:8, 0, 2, 0], paths[6:8, 1, 2, 0], atol=0.004)
+
+
+def test_a_plan_that_is_made_feasible_has_no_joints_of_the_one_before() -> None:
+    score = Score(
+        np.array([40, 44]), np.array([0.0, 0.2]), np.array([0.2, 0.5]), np.array([64, 64])
+    )
+    plan = ZeroShotPlanner().plan(score)
+    assert plan.joints is not None
+    assert make_feasible(plan).joints is None

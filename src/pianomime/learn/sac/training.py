@@ -127,7 +127,7 @@ class SacVecEnv(Sb3MultiSongEnv):
 
 
 class _Actor(nn.Module):
-    """The mean action of a SAC actor, with the inputs and output of an end-to-end policy."""
+    """The mean action of SAC or TQC, with the inputs and output of an end-to-end policy."""
 
     action_scale: Tensor
 
