@@ -17,10 +17,9 @@ class TrainSac:
     """Train one policy for all songs by reinforcement learning, without demonstrations.
 
     This is the paper's multi-task SAC, a baseline, unless --algorithm, --hit or --reach say
-    otherwise. OUT then holds multi-task-sac.onnx, and the
-    folder multi-task-sac the training. The same command again resumes a training that was stopped,
-    from its last checkpoint; there is one every 50,000 control steps, of up to 1 GB. Set
-    PIANOMIME_WEIGHTS=OUT to play with the policy.
+    otherwise. OUT then holds multi-task-sac.onnx, and the folder multi-task-sac the training. The
+    same command again resumes a training that was stopped, from its last checkpoint; there is one
+    every 50,000 control steps, of up to 1 GB. Set PIANOMIME_WEIGHTS=OUT to play with the policy.
 
     Examples:
       pianomime train-sac MIDI_FOLDER

@@ -210,14 +210,14 @@ class _Beam:
             strikes = _strikes(options[side], struck.keys)
             fingers, row = self._hand(side, struck.onset - config.early)
             hands.append(hand_cost(side, fingers, strikes, struck, config))
-            rows.append(row[:, None])
+            rows.append(row)
         left, right = hands
         # (P, M): who plays each note.
         mine, other = options[LEFT][pairs[:, LEFT]], options[RIGHT][pairs[:, RIGHT]]
         assigned = np.where(mine >= 0, mine, np.where(other >= 0, other + FINGER_COUNT, -1))
         frames = np.minimum(struck.lost(struck.onset, struck.ends), config.most_frames)
         left_out = config.drop * struck.unit * factor + frames
-        at_left, at_right = ((rows[side], pairs[:, side]) for side in (LEFT, RIGHT))
+        at_left, at_right = ((rows[side][:, None], pairs[:, side]) for side in (LEFT, RIGHT))
         apart = right.centre[at_right] - left.centre[at_left]
         total = self.cost[:, None] + (assigned < 0) @ left_out
         total += left.cost[at_left] + right.cost[at_right]
@@ -230,7 +230,7 @@ class _Beam:
         def both(name: str) -> NDArray[Any]:
             """(keep, 2, ...) An attribute of the chosen continuations of both hands."""
             each = [
-                getattr(hand, name)[rows[side][parent, 0], pairs[pair, side]]
+                getattr(hand, name)[rows[side][parent], pairs[pair, side]]
                 for side, hand in enumerate(hands)
             ]
             return np.stack(each, axis=1)

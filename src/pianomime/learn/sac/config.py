@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from pianomime.keyboard import EXCERPT_SECONDS
 from pianomime.validation import above_zero, one_of, whole_numbers, widths, within
+
+Algorithm = Literal["sac", "tqc"]
 
 
 @dataclass(frozen=True)
 class SacConfig:
     """Soft actor-critic (Haarnoja et al., 2018) on many songs (paper, appendix G)."""
 
-    algorithm: Literal["sac", "tqc"] = "sac"
+    algorithm: Algorithm = "sac"
     """The paper's, or truncated quantile critics (Kuznetsov et al., 2020), which go on from it."""
     total_steps: int = 500_000
     """Control steps in all environments together."""
@@ -48,7 +50,7 @@ class SacConfig:
         within("buffer_size", self.buffer_size, self.batch_size)
         for name in ("learning_rate", "seconds"):
             above_zero(name, getattr(self, name))
-        one_of("algorithm", self.algorithm, ("sac", "tqc"))
+        one_of("algorithm", self.algorithm, get_args(Algorithm))
         for name in ("gamma", "hit"):
             within(name, getattr(self, name), 0, 1)
         within("reach", self.reach, 0)

@@ -29,7 +29,7 @@ from pianomime.learn.imitation.normalizer import StandardNormalizer
 from pianomime.learn.runs.log import RunLog
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.safetensors_file import Arrays
-from pianomime.learn.sac.config import SacConfig
+from pianomime.learn.sac.config import Algorithm, SacConfig
 from pianomime.music import Score
 from pianomime.policies.features import holding_controls, tracking_observation
 from pianomime.policies.horizon import CHUNK
@@ -46,7 +46,7 @@ ACTION_SCALE = by_actuator(finger=0.3, wrist=0.3, slide=0.06)
 """(46,) [rad, m] added for an action of 1 to the control that holds the present pose."""
 _NORMALIZER_STEPS = 64
 """Control steps, in all environments, that the normalizer of observations is fitted to."""
-_ALGORITHMS: dict[str, type[SAC] | type[TQC]] = {"sac": SAC, "tqc": TQC}
+_ALGORITHMS: dict[Algorithm, type[SAC] | type[TQC]] = {"sac": SAC, "tqc": TQC}
 _CHECKPOINT_STEPS = 50_000
 """Control steps between checkpoints, about; the whole replay buffer is in them."""
 _LOG_STEPS = 200

@@ -80,17 +80,11 @@ class NoteCost:
     def of(
         self, first: int, frames: Sequence[Frame], count: int
     ) -> tuple[float, list[tuple[int, int]]]:
-        """The cost of some frames, and what goes wrong in them.
+        """As `Cost.of`.
 
-        Args:
-            first: number of the first frame.
-            frames: what is heard in it and in those that follow.
-            count: of the frames that count; later ones only show what still comes.
-
-        Returns:
-            The cost; and what goes wrong, as frames counted from the first, and keys: notes that
-            are missed, strikes that nobody wanted, and those that are more off than `notice`.
-            Keys that are wrong at the end of a frame, and nothing else, are not among it.
+        What goes wrong are notes that are missed, strikes that nobody wanted, and those that are
+        more off than `notice`. Keys that are wrong at the end of a frame, and nothing else, are not
+        among it.
         """
         tally = self.tally(first)
         for step, frame in enumerate(frames):
