@@ -12,7 +12,7 @@ from pianomime.music import Score
 from pianomime.plan import FingertipPlan, ZeroShotConfig, ZeroShotPlanner
 from pianomime.plan.fingering_cost import FingeringConfig
 from pianomime.track import Controller, Tracker, controls_per_frame
-from pianomime.track.sampling.cost import Strike, strikes_in
+from pianomime.track.heard import Strike, strikes_in
 from pianomime.world import World
 from pianomime.world.touch import TOUCHES
 

@@ -26,7 +26,7 @@ from pianomime.track import (
     controls_per_frame,
     keystroke,
 )
-from pianomime.track.sampling.cost import strikes_in
+from pianomime.track.heard import strikes_in
 from pianomime.track.strokes import StrokeConfig
 from pianomime.world import World
 from pianomime.world.hand import Hand

@@ -11,8 +11,8 @@ from heard import listen, notes, plan_of, play, scale
 from pianomime.errors import InputError
 from pianomime.plan.strikes import Strikes
 from pianomime.track import KeystrokeTracker, RehearsalConfig, RehearsedTracker
+from pianomime.track.heard import Strike
 from pianomime.track.rehearsal import corrected
-from pianomime.track.sampling.cost import Strike
 from pianomime.track.strokes import Corrections
 
 PLAIN = KeystrokeTracker()

@@ -17,8 +17,8 @@ from pianomime.keyboard import FRAME_SECONDS
 from pianomime.music import Score
 from pianomime.plan import ZeroShotConfig, ZeroShotPlanner
 from pianomime.plan.fingering_cost import FingeringConfig
+from pianomime.track.heard import strikes_in
 from pianomime.track.keystroke import KeystrokeTracker
-from pianomime.track.sampling.cost import strikes_in
 from pianomime.world import World
 from pianomime.world.hand import Hand
 from pianomime.world.layout import LAYOUT

@@ -17,8 +17,8 @@ from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.plan.strikes import Strikes
 from pianomime.progress import Steps
+from pianomime.track.heard import Strike, strikes_in
 from pianomime.track.keystroke import KeystrokeController
-from pianomime.track.sampling.cost import Strike, strikes_in
 from pianomime.track.strokes import Corrections
 from pianomime.validation import above_zero, finite, whole_numbers, within
 from pianomime.world import World

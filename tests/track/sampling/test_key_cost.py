@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import KEYS
-from pianomime.track.sampling.cost import Frame, Strike
+from pianomime.track.heard import Frame, Strike
 from pianomime.track.sampling.key_cost import KeyCost
 
 GOAL = np.zeros((4, KEYS), bool)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.plan.strikes import Strikes
-from pianomime.track.sampling.cost import Frame, Strike, strikes_in
+from pianomime.track.heard import Frame, Strike, strikes_in
 from pianomime.track.sampling.note_cost import NoteCost, NoteCostConfig
 from pianomime.world.key_sensor import NOTHING, KeyEvents
 from pianomime.world.touch import TOUCHES

@@ -21,8 +21,8 @@ from pianomime.track import (
     NoteSamplingTracker,
     controls_per_frame,
 )
+from pianomime.track.heard import Frame, strikes_in
 from pianomime.track.keystroke import KeystrokeController
-from pianomime.track.sampling.cost import Frame, strikes_in
 from pianomime.track.sampling.note_cost import NoteCost, NoteCostConfig
 from pianomime.track.sampling.perturbed_copies import COPIES
 from pianomime.track.sampling.variations import Variations

@@ -12,7 +12,7 @@ from heard import notes, plan_of, play
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.track import KeystrokeTracker, NoteSamplingConfig, NoteSamplingTracker
-from pianomime.track.sampling.cost import Frame, strikes_in
+from pianomime.track.heard import Frame, strikes_in
 from pianomime.track.sampling.note_cost import NoteCost, NoteCostConfig
 from pianomime.track.sampling.perturbed_copies import COPIES, PerturbedCopy
 from pianomime.track.sampling.predictive_sampling import PredictiveSamplingController

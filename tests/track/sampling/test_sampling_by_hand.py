@@ -13,7 +13,7 @@ from pianomime.errors import InputError
 from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.plan import FingertipPlan
 from pianomime.track import PredictiveSamplingConfig
-from pianomime.track.sampling.cost import Frame
+from pianomime.track.heard import Frame
 from pianomime.track.sampling.key_cost import KeyCost
 from pianomime.track.sampling.predictive_sampling import PredictiveSamplingController
 from pianomime.track.sampling.rollouts import Rollouts

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pianomime.track.sampling.cost import Frame, Strike
+from pianomime.track.heard import Frame, Strike
 
 
 class KeyCost:

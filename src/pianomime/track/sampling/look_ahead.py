@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.track.controller import Controller, controls_per_frame
-from pianomime.track.sampling.cost import Frame, strikes_in
+from pianomime.track.heard import Frame, strikes_in
 from pianomime.world import World
 
 

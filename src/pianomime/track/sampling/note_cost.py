@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan.strikes import Strikes
-from pianomime.track.sampling.cost import Frame, Strike
+from pianomime.track.heard import Frame, Strike
 from pianomime.validation import above_zero, finite
 from pianomime.world.touch import Touch
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS, KEYS
-from pianomime.track.sampling.cost import Cost, Frame, strikes_in
+from pianomime.track.heard import Frame, strikes_in
+from pianomime.track.sampling.cost import Cost
 from pianomime.track.sampling.rollouts import Rollouts, Start
 from pianomime.world import World
 from pianomime.world.perturbation import Perturbation

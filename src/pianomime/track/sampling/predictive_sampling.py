@@ -23,7 +23,8 @@ from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS
 from pianomime.plan import FingertipPlan
 from pianomime.track.controller import Controller, controls_per_frame
-from pianomime.track.sampling.cost import Cost, Frame, strikes_in
+from pianomime.track.heard import Frame, strikes_in
+from pianomime.track.sampling.cost import Cost
 from pianomime.track.sampling.key_cost import KeyCost
 from pianomime.track.sampling.look_ahead import LookAhead, Step
 from pianomime.track.sampling.perturbed_copies import PerturbedCopy

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_SECONDS, KEYS
-from pianomime.track.sampling.cost import Cost, Frame, Strike, strikes_in
+from pianomime.track.heard import Frame, Strike, strikes_in
+from pianomime.track.sampling.cost import Cost
 from pianomime.world import World, WorldBatch
 from pianomime.world.hand import hand_points
 from pianomime.world.one_hand import one_hand_model, state_of_one_hand
