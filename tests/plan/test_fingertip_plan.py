@@ -35,6 +35,7 @@ def test_length_and_dropped_notes() -> None:
         ("note_hand", np.zeros(2, np.int8), "one entry per note"),
         ("joints", np.zeros((4, 2, 23)), "joints must be"),
         ("joints", np.zeros((3, 2, 27)), "joints must be"),
+        ("joints", np.full((4, 2, 27), np.nan), "joints hold values that are not finite"),
     ],
 )
 def test_refuses_what_does_not_fit(name: str, value: NDArray[np.generic], message: str) -> None:

@@ -48,7 +48,7 @@ class FingertipPlan:
             from them. Files do not hold them.
 
     Raises:
-        ValueError: shapes do not match, or `fingertips` is not finite.
+        ValueError: shapes do not match, or `fingertips` or `joints` are not finite.
     """
 
     fingertips: NDArray[np.float64]
@@ -69,8 +69,10 @@ class FingertipPlan:
             raise ValueError(f"joints must be {wanted}, not {self.joints.shape}")
         if self.note_hand.shape != self.note_finger.shape:
             raise ValueError("note_hand and note_finger must both have one entry per note")
-        if not np.isfinite(self.fingertips).all():
-            raise ValueError("fingertips hold values that are not finite")
+        for name in ("fingertips", "joints"):
+            array = getattr(self, name)
+            if array is not None and not np.isfinite(array).all():
+                raise ValueError(f"{name} hold values that are not finite")
 
     def __repr__(self) -> str:
         notes = count(len(self.note_hand), "note")

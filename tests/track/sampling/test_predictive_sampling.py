@@ -97,6 +97,12 @@ def test_a_controller_with_a_memory_is_refused_in_one_line(plan: FingertipPlan) 
     assert "\n" not in str(error.value)
 
 
+def test_a_goal_shorter_than_the_plan_is_refused_in_one_line(plan: FingertipPlan) -> None:
+    tracker = PredictiveSamplingTracker(DynamicTracker(), QUICK, goal=plan.keys()[1:])
+    with pytest.raises(InputError, match=f"the plan has {len(plan)}$"):
+        tracker.start(plan)
+
+
 @pytest.mark.parametrize("effort", [-1, 4])
 def test_no_such_effort(effort: int) -> None:
     with pytest.raises(InputError, match="effort must be"):

@@ -98,9 +98,11 @@ class PredictiveSamplingTracker:
 
         Raises:
             InputError: the other tracker's controller is not replayable, has no plan, or gives
-                several controls a frame.
+                several controls a frame; or the goal is shorter than the plan.
         """
         goal = plan.keys() if self._goal is None else self._goal
+        if len(goal) < len(plan):
+            raise InputError(f"a goal of {len(goal)} frames is too short: the plan has {len(plan)}")
         base = self._tracker.start(plan)
         if base.replayable and controls_per_frame(base) > 1:
             raise InputError(
