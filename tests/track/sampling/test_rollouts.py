@@ -24,14 +24,18 @@ from pianomime.world.perturbation import Perturbation
 from pianomime.world.touch import TOUCHES
 
 FIRST, FRAMES = 6, 5
-FAR = notes([20, 24, 60, 64], [0.0, 0.15, 0.0, 0.15])
+APART = notes([20, 24, 60, 64], [0.0, 0.15, 0.0, 0.15])
 """The hands are far from each other."""
+TOGETHER = notes([36, 40, 45, 48], [0.0, 0.15, 0.0, 0.15])
+"""The hands are beside each other."""
 
 
 @cache
-def scene() -> tuple[FingertipPlan, World, NDArray[np.float64], list[Frame], NDArray[np.float64]]:
+def scene(
+    apart: bool = True,
+) -> tuple[FingertipPlan, World, NDArray[np.float64], list[Frame], NDArray[np.float64]]:
     """Some frames in which notes are played: the world before them, controls, what is heard."""
-    plan = plan_of(FAR)
+    plan = plan_of(APART if apart else TOGETHER)
     base, world = KeystrokeTracker().start(plan), World()
     for number in range(5 * FIRST):
         world.step(base.control(number, world), parts=5)
@@ -53,14 +57,14 @@ def cost_of(plan: FingertipPlan) -> NoteCost:
     return NoteCost(plan.strikes, plan.keys(), TOUCHES["goebl-bresin"], NoteCostConfig())
 
 
-def rollouts(most: int, perturbation: Perturbation | None = None) -> Rollouts:
-    plan = scene()[0]
+def rollouts(most: int, perturbation: Perturbation | None = None, apart: bool = True) -> Rollouts:
+    plan = scene(apart)[0]
     return Rollouts(cost_of(plan), plan.keys(), most, 1, "paper", perturbation)
 
 
-def varied(hand: int, count: int) -> NDArray[np.float64]:
+def varied(hand: int, count: int, apart: bool = True) -> NDArray[np.float64]:
     """Controls of which those of one hand vary, ever more."""
-    _, _, ctrl, _, _ = scene()
+    _, _, ctrl, _, _ = scene(apart)
     more = np.zeros((count, 1, 1, LAYOUT.ctrl_size))
     drawn = np.random.default_rng(3).normal(0, 0.05, (count, 1, 1, LAYOUT.hand_actuators))
     more[..., LAYOUT.actuators[hand]] = drawn
@@ -117,21 +121,27 @@ def test_in_perturbed_copies_the_mean_cost_is_added_and_losers_are_not_rolled_ou
 
 @pytest.mark.parametrize("perturbation", [None, COPIES[0]])
 @pytest.mark.parametrize("hand", [0, 1])
-@pytest.mark.parametrize("near", [False, True])
+@pytest.mark.parametrize(("beside", "apart"), [(False, True), (True, True), (True, False)])
 def test_one_hand_alone_is_heard_as_both_are(
-    hand: int, near: bool, perturbation: Perturbation | None
+    hand: int, beside: bool, apart: bool, perturbation: Perturbation | None
 ) -> None:
-    _, world, ctrl, known, hands = scene()
-    found = rollouts(4, perturbation)
+    _, world, ctrl, known, hands = scene(apart)
+    found = rollouts(4, perturbation, apart)
     start = found.start(FIRST, world, known)
     # What both do there is what the other hand does while one is varied.
     start = start._replace(known=found.best(start, ctrl[None]).heard)
-    keys = keys_of(hand, hands, 0.05)
-    assert keys is not None
-    alone = found.start_beside(start, hand, ctrl) if near else found.start_alone(start, hand, keys)
-    assert found.alone == near * FRAMES
+    keys = keys_of(hand, hands, 0.1)
+    assert (keys is not None) == apart
+    if beside:
+        alone = found.start_beside(start, hand, ctrl)
+    else:
+        assert keys is not None
+        alone = found.start_alone(start, hand, keys)
+    assert found.alone == beside * FRAMES
     before, before_alone = found.steps, found.alone
-    for one in (ctrl, *varied(hand, 3)):
+    # Where hands are together, little enough for neither to touch a key that the other one presses.
+    variations = ctrl + (1.0 if apart else 0.3) * (varied(hand, 3, apart) - ctrl)
+    for one in (ctrl, *variations):
         both, mine = found.best(start, one[None]), found.best(alone, one[None])
         for whole, part in zip(both.heard, mine.heard, strict=True):
             np.testing.assert_array_equal(part.pressed, whole.pressed)
