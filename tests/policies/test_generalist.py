@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pianomime import load_player
+from pianomime import excerpt, load_player, songs
 from pianomime.errors import InputError
 from pianomime.music import Score
 from pianomime.plan import ZeroShotPlanner
 from pianomime.players import rollout
 from pianomime.players.generalist import GeneralistPlayer
 from pianomime.policies.features import action_reference, relative_to_wrist, to_world_frame
-from pianomime.policies.fingertip_policy import LearnedPlanner
+from pianomime.policies.fingertip_policy import LearnedPlanner, LearnedPlannerConfig
 from pianomime.policies.methods import METHODS, WEIGHTS
 from pianomime.policies.policy_tracker import PolicyTracker
 from pianomime.world import World
@@ -127,7 +127,27 @@ def test_what_is_told_from_wrists_is_taken_back():
 
 
 def test_a_song_that_is_planned_ahead_is_what_would_be_wanted_on_the_way():
-    ahead = LearnedPlanner(Pointing("high")).plan(SCORE)
+    predicted = LearnedPlannerConfig(feasible=False)
+    ahead = LearnedPlanner(Pointing("high"), config=predicted).plan(SCORE)
     way = play(Still("low"), Pointing("high")).plan
     for name in ("fingertips", "finger_key", "note_hand", "note_finger"):
         np.testing.assert_array_equal(getattr(ahead, name), getattr(way, name))
+
+
+def test_predicted_fingers_keep_their_keys_where_hands_can_be():
+    predicted = LearnedPlannerConfig(feasible=False)
+    raw = LearnedPlanner(Pointing("high"), config=predicted).plan(SCORE)
+    feasible = LearnedPlanner(Pointing("high")).plan(SCORE)
+    for name in ("finger_key", "note_hand", "note_finger"):
+        np.testing.assert_array_equal(getattr(feasible, name), getattr(raw, name))
+    assert not np.allclose(feasible.fingertips, raw.fingertips)
+    np.testing.assert_array_equal(feasible.fingertips[..., 2], raw.fingertips[..., 2])
+
+
+def test_feasible_fingertips_are_played_better():
+    score = excerpt(Score.from_midi(songs.path("bach-prelude-c")), seconds=10)
+    feasible, raw = (
+        load_player("two-stage-diff", 0, **{"planner.feasible": each}).play(score).metrics()["f1"]
+        for each in (True, False)
+    )
+    assert feasible > raw + 0.02

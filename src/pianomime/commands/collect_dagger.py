@@ -26,7 +26,8 @@ class CollectDagger:
     expert's control, so that policies also learn to recover. The expert itself plays, or a
     low-level policy that was trained before (--rollout-policy), which is DAgger proper (Ross et
     al., 2011). The fingertips are the human's, or those that a high-level policy predicts
-    (--fingertip-policy). OUT is a data set in the form of `pianomime collect`.
+    (--fingertip-policy); then DEMOS can also be MIDI files. OUT is a data set in the form of
+    `pianomime collect`.
 
     Examples:
       pianomime collect-dagger demonstrations.npz -o dagger.zarr
@@ -35,11 +36,14 @@ class CollectDagger:
       pianomime collect-dagger demonstrations.npz -o more.zarr \
         --rollout-policy first/low-diff.onnx \
         --fingertip-policy out/generalist/high-diff.onnx
-      pianomime train low-diff --experts dagger.zarr more.zarr
+      pianomime collect-dagger MIDI_FOLDER -o songs.zarr \
+        --fingertip-policy out/generalist/high-diff.onnx
+      pianomime train low-diff --experts dagger.zarr more.zarr songs.zarr
     """
 
     demonstrations: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DEMOS")]
-    """A demonstration (.npz), a folder of such, or an .npz file of PianoMime's published ones."""
+    """A demonstration (.npz), a folder of such, or an .npz file of PianoMime's published ones; with
+    --fingertip-policy also a MIDI file, or a folder of such."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/dagger.zarr")
     """The data set; an existing one is replaced."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
@@ -80,18 +84,32 @@ class CollectDagger:
         )
 
         need_packages("train")
-        need_demonstrations(self.demonstrations)
+        if not self._songs():
+            need_demonstrations(self.demonstrations)
         need_place_for_data_set(self.out)
         if self.config.rollout_policy is not None or self.config.fingertip_policy is not None:
             from pianomime.learn.data.dagger import check_policies
 
             check_policies(self.config)
 
+    def _songs(self) -> list[Path]:
+        """The MIDI files whose fingertips are predicted; none where there are demonstrations."""
+        from pianomime.songs.find import MIDI_SUFFIXES, find_songs
+
+        source = self.demonstrations
+        if self.config.fingertip_policy is None or next(source.rglob("*.npz"), None):
+            return []
+        midi = source.is_dir() or source.suffix.lower() in MIDI_SUFFIXES
+        return find_songs([source]) if midi else []
+
     def _episodes(self, progress: Progress, f1: list[float]) -> Generator[Episode, None, None]:
-        from pianomime.learn.data.dagger import collect_dagger
+        from pianomime.learn.data.dagger import collect_dagger, songs_without_plan
         from pianomime.learn.data.dataset import read_demonstrations
 
-        demonstrations = read_demonstrations(self.demonstrations)
+        songs = self._songs()
+        demonstrations = (
+            songs_without_plan(songs) if songs else read_demonstrations(self.demonstrations)
+        )
         limit = self.config.max_demonstrations
         if limit:
             demonstrations = demonstrations[:: -(-len(demonstrations) // limit)]

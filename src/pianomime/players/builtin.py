@@ -18,6 +18,7 @@ from pianomime.players.generalist import GeneralistPlayer, ThreeStagePlayer
 from pianomime.players.player import PlannedPlayer, Player
 from pianomime.players.receding_horizon import HorizonConfig, RecedingHorizonPlayer
 from pianomime.players.settings import PlayerFactory, configure
+from pianomime.policies.fingertip_policy import LearnedPlanner, LearnedPlannerConfig
 from pianomime.policies.methods import (
     FINGERS,
     GENERALISTS,
@@ -188,13 +189,26 @@ def _generalist(method: str) -> PlayerFactory:
         world: str = PAPER,
         **settings: Any,
     ) -> Player:
-        (sampler,) = configure(settings, sampler=SAMPLERS[effort])
+        configs = _generalist_configs(method, effort)
+        sampler, *planners = configure(settings, **configs)
         *high, low = zip(GENERALISTS[method], weight_files(method, weights), strict=True)
         tracker = load_policy_tracker(low[1], sampler, seed, low[0])
-        fingertips = load_policy(high[0][1], sampler, high[0][0]) if high else None
-        return GeneralistPlayer(method, tracker, fingertips, seed, effort, world)
+        if not high:
+            return GeneralistPlayer(method, tracker, None, seed, effort, world)
+        policy = load_policy(high[0][1], sampler, high[0][0])
+        if not planners[0].feasible:
+            return GeneralistPlayer(method, tracker, policy, seed, effort, world)
+        planner = LearnedPlanner(policy, seed, planners[0])
+        return PlannedPlayer(method, planner, tracker, effort, world=world)
 
     return make
+
+
+def _generalist_configs(method: str, effort: int) -> dict[str, Any]:
+    """The configs of a generalist by group: only one of two stages plans."""
+    sampler = {"sampler": SAMPLERS[effort]}
+    two_stages = len(GENERALISTS[method]) == 2
+    return {**sampler, "planner": LearnedPlannerConfig()} if two_stages else sampler
 
 
 FACTORIES: dict[str, PlayerFactory] = {
@@ -221,7 +235,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     ZERO_SHOT_20HZ: {"planner": ZeroShotConfig(), "tracker": DynamicConfig(), **_SAMPLING},
     "zero-shot-ik": {"planner": ZeroShotConfig(), "tracker": IkConfig()},
     FINGERS: {"planner": ZeroShotConfig(), **_SAMPLING},
-    **{method: {"sampler": SAMPLERS[1]} for method in GENERALISTS},
+    **{method: _generalist_configs(method, 1) for method in GENERALISTS},
     "demonstration": {"planner": DemonstrationConfig(), "tracker": DynamicConfig(), **_SAMPLING},
     "demonstration-ik": {"tracker": IkConfig()},
 }

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
+from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.features import fingertip_observation, rest_points, to_world_frame
-from pianomime.policies.finger_assignment import assign_fingers
+from pianomime.policies.finger_assignment import assign_fingers, flat_heights
 from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
 from pianomime.policies.policy import Policy
+from pianomime.progress import Steps
 from pianomime.world.layout import FINGER_COUNT, POINT_COUNT
 
 
@@ -53,23 +57,53 @@ class FingertipRollout:
         return targets
 
 
+@dataclass(frozen=True)
+class LearnedPlannerConfig:
+    """How predicted fingertips are followed."""
+
+    feasible: bool = True
+    """Predict the whole song, and move fingertips to where the robot's hands can be, see
+    `make_feasible`; otherwise they are predicted while it is played, and followed as they are."""
+
+
 class LearnedPlanner:
     """Plans a whole song before it is played, as the published code does.
 
     Args:
         policy: the fingertip policy.
         seed: of its sampling.
+        config: whether fingertips are made feasible.
     """
 
-    def __init__(self, policy: Policy, seed: int = 0) -> None:
+    def __init__(
+        self, policy: Policy, seed: int = 0, config: LearnedPlannerConfig | None = None
+    ) -> None:
         self._policy, self._seed = policy, seed
+        self._config = config or LearnedPlannerConfig()
 
     def plan(self, score: Score) -> FingertipPlan:
         """One row for each frame of `score.roll()`."""
-        rollout = FingertipRollout(score, self._policy, self._seed)
-        for frame in range(score.frames()):
+        rollout, steps = FingertipRollout(score, self._policy, self._seed), score.frames()
+        told = Steps("fingertips", steps)
+        for frame in range(steps):
             rollout.step(frame)
-        return rollout.plan.plan()
+            told.advance(1)
+        plan = rollout.plan.plan()
+        return feasible_targets(plan) if self._config.feasible else plan
+
+
+def feasible_targets(plan: FingertipPlan) -> FingertipPlan:
+    """A plan with fingertips where the robot's hands can be, as low-level policies follow it.
+
+    Args:
+        plan: the fingertips of a human, or of a high-level policy.
+
+    Returns:
+        The same fingers on the same keys, see `make_feasible`, with heights that tell alone which
+        fingers press, see `flat_heights`.
+    """
+    feasible = make_feasible(plan)
+    return replace(feasible, fingertips=flat_heights(feasible.fingertips, feasible.finger_key))
 
 
 class PlanRecord:

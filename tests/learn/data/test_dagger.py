@@ -10,10 +10,13 @@ from pianomime.errors import InputError
 from pianomime.learn.data.dagger import collect_dagger, collect_dagger_episode
 from pianomime.learn.data.dagger_config import DaggerConfig
 from pianomime.learn.data.trajectories import TrajectoryData
+from pianomime.music import Score
+from pianomime.plan.fingertip_plan import HOVER_HEIGHT
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.methods import weights_folder
 from pianomime.track import DynamicTracker
 from pianomime.world import World
+from pianomime.world.hand import hand_points
 
 QUIET = DaggerConfig(noise=0.0)
 
@@ -101,6 +104,38 @@ def test_a_fingertip_policy_and_a_rollout_policy_play(two_notes):
     assert not np.array_equal(shown.columns["fingertips"], usual.columns["fingertips"])
     np.testing.assert_array_equal(shown.columns["goal"], usual.columns["goal"])
     assert np.isfinite(shown.columns["action"]).all()
+
+
+def test_fingertips_that_are_predicted_are_followed_where_hands_can_be(two_notes):
+    """What low levels observe is what the expert follows: smooth, at heights that tell presses."""
+    weights = weights_folder()
+    config = DaggerConfig(fingertip_policy=weights / "high-diff.onnx", noise=0.0)
+    columns = collect_dagger_episode(two_notes, 0, config).columns
+    z = columns["fingertips"][..., 2]
+    assert set(np.unique(z)) == {np.float32(0.0), np.float32(HOVER_HEIGHT)}
+    np.testing.assert_array_equal(z[:, :, 1:] == 0, columns["finger_key"] >= 0)
+    away = np.abs(columns["fingertips"] - hand_points(columns["joints"]))[..., 1]
+    assert np.median(away) < 0.005
+
+
+def test_songs_without_demonstrations_are_played_with_predicted_fingertips(tmp_path, capsys):
+    folder, out = tmp_path / "songs", tmp_path / "dagger.zarr"
+    folder.mkdir()
+    score = Score([40, 44], [0.0, 0.5], [0.4, 1.0], [80, 80])
+    for name in ("one.mid", "two.mid"):
+        score.to_midi(folder / name)
+    policy = str(weights_folder() / "high-diff.onnx")
+    with pytest.raises(SystemExit):
+        cli.main(["collect-dagger", str(folder), "-o", str(out)])
+    assert "no demonstrations (.npz)" in capsys.readouterr().err
+    cli.main(
+        ["collect-dagger", str(folder), "-o", str(out), "--jobs", "1", "--fingertip-policy", policy]
+    )
+    assert "played: 2," in capsys.readouterr().out
+    data = TrajectoryData.open(out)
+    assert len({episode["song_id"] for episode in data.episodes}) == 1, "the same music"
+    pressed = data.columns(0, ["finger_key"])["finger_key"]
+    assert set(np.unique(pressed)) >= {-1, 40, 44}
 
 
 def test_another_seed_draws_otherwise(two_notes):

@@ -22,10 +22,17 @@ from pianomime.errors import InputError, WorkFailed
 from pianomime.learn.data.dagger_config import DaggerConfig
 from pianomime.learn.data.episode import Episode, base_controls, fill_columns, record
 from pianomime.learn.data.noisy_controller import NoisyController, noise_spread
+from pianomime.learn.data.perform_worker import song_number
+from pianomime.music import Score
+from pianomime.music.excerpt import excerpt
 from pianomime.plan.demonstration import Demonstration
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.finger_assignment import flat_heights
-from pianomime.policies.fingertip_policy import LearnedPlanner
+from pianomime.policies.fingertip_policy import (
+    LearnedPlanner,
+    LearnedPlannerConfig,
+    PlanRecord,
+)
 from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.network_file import load_policy
 from pianomime.policies.sampler import Sampler
@@ -44,10 +51,9 @@ def collect_dagger_episode(
 ) -> Episode:
     """Play a demonstration and record the expert's controls as `action`.
 
-    The expert is the dynamic tracker. The demonstration's fingertips are first made feasible for
-    the robot's hands (`make_feasible`): these are what high levels learn to predict and low levels
-    to reach. Fingertips of a high-level policy are recorded as it predicts them, and made feasible
-    for the expert alone.
+    The expert is the dynamic tracker. The fingertips, the demonstration's or those that a
+    high-level policy predicts, are first made feasible for the robot's hands (`make_feasible`):
+    these are what high levels learn to predict and low levels to reach.
 
     Args:
         demonstration: what to play.
@@ -61,13 +67,13 @@ def collect_dagger_episode(
     spread = noise_spread(config.noise * rng.random())
     seeds = rng.integers(2**31, size=2).tolist()
     score = demonstration.score
-    if config.fingertip_policy is None:
-        feasible = make_feasible(demonstration.plan)
-        plan = replace(feasible, fingertips=flat_heights(feasible.fingertips, feasible.finger_key))
-    else:
+    plan = demonstration.plan
+    if config.fingertip_policy is not None:
+        predicted = LearnedPlannerConfig(feasible=False)
         policy = load_policy(config.fingertip_policy, _FAST)
-        plan = LearnedPlanner(policy, seeds[1]).plan(score)
-        feasible = make_feasible(plan)
+        plan = LearnedPlanner(policy, seeds[1], predicted).plan(score)
+    feasible = make_feasible(plan)
+    plan = replace(feasible, fingertips=flat_heights(feasible.fingertips, feasible.finger_key))
     played = None
     if config.rollout_policy is not None:
         played = load_policy_tracker(config.rollout_policy, _FAST, seeds[0]).start(plan)
@@ -78,6 +84,24 @@ def collect_dagger_episode(
     base = base_controls(IkTracker().start(plan), qpos)
     f1 = fill_columns(columns, base, score.roll(), plan.fingertips, plan.finger_key)
     return Episode(score.title, f1, "ik", columns, demonstration.song_id, events=events)
+
+
+def songs_without_plan(paths: Sequence[Path]) -> list[Demonstration]:
+    """Songs whose fingertips a high-level policy is to predict; until then hands rest.
+
+    Args:
+        paths: of MIDI files, of which the first 30 s are taken.
+
+    Raises:
+        InputError: one cannot be read.
+    """
+    demonstrations = []
+    for path in paths:
+        whole = Score.from_midi(path)
+        score = excerpt(whole)
+        plan, song_id = PlanRecord(score).plan(), song_number(whole)
+        demonstrations.append(Demonstration(score, plan, path.name, song_id=song_id))
+    return demonstrations
 
 
 def check_policies(config: DaggerConfig) -> None:
