@@ -1,11 +1,12 @@
-"""What each stage of `three-stage` costs: its networks take the planner's place one by one.
+"""What each stage of a generalist costs: its networks take the planner's place one by one.
 
-    python benchmarks/stages.py SONG.mid ... [--seconds 30]
+    python benchmarks/stages.py SONG.mid ... [--method three-stage] [--seconds 30]
 
-plays every song four times at effort 0: as `zero-shot-20hz` does; with the fingers that `fingering`
-says, along planned paths; with the fingertips that `hand-motion` predicts, too; and by
-`three-stage`. The first three have the same tracker, inverse dynamics. Prints the mean precision,
-recall and F1.
+plays every song at effort 0 as `zero-shot-20hz` does, then with ever more networks. Of
+`three-stage`: with the fingers that `fingering` says, along planned paths; with the fingertips that
+`hand-motion` predicts, too; and whole. Of `two-stage-diff`: with the fingertips that `high-diff`
+predicts, made feasible; whole; and whole, but with the fingertips followed as they are predicted.
+All but the whole have the same tracker, inverse dynamics. Prints the mean precision, recall and F1.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from pianomime.plan import FingertipPlan
 from pianomime.plan.hand_path import hand_paths
 from pianomime.players.builtin import ZERO_SHOT_20HZ
 from pianomime.players.player import PlannedPlayer, Player
-from pianomime.policies.methods import THREE_STAGE, load_stages
+from pianomime.policies.fingertip_policy import LearnedPlanner
+from pianomime.policies.methods import SAMPLERS, THREE_STAGE, load_stages, policy_path
+from pianomime.policies.network_file import load_policy
 from pianomime.policies.three_stage.fingering import FingeringRollout
 from pianomime.policies.three_stage.hand_motion import HandMotionRollout
 from pianomime.songs.find import find_songs
@@ -59,21 +62,38 @@ class NetworkPlanner:
         return FingertipPlan(points, keys, nobody, nobody)
 
 
-PLAYERS: dict[str, Callable[[], Player]] = {
-    ZERO_SHOT_20HZ: partial(load_player, ZERO_SHOT_20HZ, 0),
-    "fingers by the network": lambda: PlannedPlayer(
-        "fingers", NetworkPlanner(False), DynamicTracker()
-    ),
-    "and fingertips": lambda: PlannedPlayer("tips", NetworkPlanner(True), DynamicTracker()),
-    f"and controls: {THREE_STAGE}": partial(load_player, THREE_STAGE, 0),
+def places_by_the_network() -> Player:
+    """The high-level policy and, in the place of the low-level one, the tracker."""
+    policy = load_policy(policy_path("high-diff"), SAMPLERS[0])
+    return PlannedPlayer("places", LearnedPlanner(policy), DynamicTracker())
+
+
+TWO_STAGE = "two-stage-diff"
+PLAYERS: dict[str, dict[str, Callable[[], Player]]] = {
+    THREE_STAGE: {
+        ZERO_SHOT_20HZ: partial(load_player, ZERO_SHOT_20HZ, 0),
+        "fingers by the network": lambda: PlannedPlayer(
+            "fingers", NetworkPlanner(False), DynamicTracker()
+        ),
+        "and fingertips": lambda: PlannedPlayer("tips", NetworkPlanner(True), DynamicTracker()),
+        f"and controls: {THREE_STAGE}": partial(load_player, THREE_STAGE, 0),
+    },
+    TWO_STAGE: {
+        ZERO_SHOT_20HZ: partial(load_player, ZERO_SHOT_20HZ, 0),
+        "fingertips by the network": places_by_the_network,
+        f"and controls: {TWO_STAGE}": partial(load_player, TWO_STAGE, 0),
+        "and fingertips as predicted": partial(
+            load_player, TWO_STAGE, 0, planner={"feasible": False}
+        ),
+    },
 }
 
 
-def play(song: Path, seconds: float) -> list[list[float]]:
+def play(song: Path, method: str, seconds: float) -> list[list[float]]:
     """Metrics of a song, a row for each player."""
     score = excerpt(Score.from_midi(song), seconds=seconds)
     rows = []
-    for make in PLAYERS.values():
+    for make in PLAYERS[method].values():
         metrics = make().play(score).metrics()
         rows.append([metrics[name] for name in METRICS])
     return rows
@@ -83,6 +103,7 @@ def main() -> None:
     """Play, and print the table."""
     options = common.parser("stages", __doc__)
     options.add_argument("songs", nargs="+")
+    options.add_argument("--method", choices=PLAYERS, default=THREE_STAGE)
     options.add_argument("--seconds", type=float, default=30.0)
     options.add_argument("--jobs", type=int, default=len(common.cores()))
     arguments = options.parse_args()
@@ -90,10 +111,11 @@ def main() -> None:
     common.show_machine(facts)
     songs = find_songs(arguments.songs)
     with ProcessPoolExecutor(arguments.jobs, get_context("spawn")) as pool:
-        found = list(pool.map(partial(play, seconds=arguments.seconds), songs))
+        one = partial(play, method=arguments.method, seconds=arguments.seconds)
+        found = list(pool.map(one, songs))
     rows = [
         [name, *(round(statistics.mean(each), 3) for each in zip(*mine, strict=True))]
-        for name, mine in zip(PLAYERS, zip(*found, strict=True), strict=True)
+        for name, mine in zip(PLAYERS[arguments.method], zip(*found, strict=True), strict=True)
     ]
     common.table(["player", *METRICS], rows)
     common.report(arguments.output, facts, {"songs": [song.name for song in songs], "rows": rows})

@@ -45,6 +45,28 @@ def test_a_key_out_of_reach_of_all_is_left_out():
     np.testing.assert_array_equal(tips[..., :2], rest_points()[..., :2])
 
 
+def test_nobody_reaches_farther_than_two_white_keys():
+    for away, reached in ((0.04, True), (0.05, False)):
+        tips = rest_points().copy()
+        tips[:, :, 1] -= 10.0  # nobody else is near
+        tips[1, 3] = [0.04, key_centres()[44, 1] - away, 0.0]
+        _, keys = assign_fingers(tips, goal_of(44), NOTHING)
+        assert (keys[1, 2] == 44) == reached
+
+
+def test_a_hand_moves_along_with_the_mean_of_its_pressing_fingers():
+    before = rest_points().copy()
+    before[1, [1, 3, 5], 1] -= 10.0  # nobody else is near
+    for finger, key, away in ((1, 44, 0.004), (3, 47, 0.010)):
+        before[1, finger + 1, 1] = key_centres()[key, 1] - away
+    after, keys = assign_fingers(before, goal_of(44, 47), NOTHING)
+    assert keys[1, [1, 3]].tolist() == [44, 47]
+    idle = [0, 1, 3, 5]  # the wrist is point 0
+    np.testing.assert_allclose(after[1, idle, 1], before[1, idle, 1] + 0.007)
+    np.testing.assert_allclose(after[1, [2, 4], 1], key_centres()[[44, 47], 1])
+    np.testing.assert_array_equal(after[0, :, 1], before[0, :, 1])
+
+
 def test_on_black_keys_and_beyond_the_edge_fingers_stay_on_the_key():
     for key, x in ((40, 0.1), (40, -0.2), (39, 0.2), (39, -0.2)):
         tips = over(1, 1, key)

@@ -1,7 +1,8 @@
 """Which finger presses which key, for predicted fingertips that are only roughly right.
 
 A learned planner predicts fingertips to about a finger's width, and keys are narrower. So each key
-of the goal is assigned to the nearest finger, and that fingertip is moved onto the key.
+of the goal is assigned to the nearest finger, and that fingertip is moved onto the key. Its hand
+moves along with it, so that the next prediction begins where the hand has to be.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ _PRESS_HEIGHT = 0.5 * HOVER_HEIGHT
 """[m] z below which a predicted fingertip is taken for one that presses."""
 _PRESS_BONUS = 0.02
 """[m] Distance taken off the cost of a finger that was predicted to press."""
-_MAX_DISTANCE = 0.12
-"""[m] along the keyboard beyond which no finger is assigned to a key."""
+_MAX_DISTANCE = 0.045
+"""[m] along the keyboard beyond which no finger is assigned to a key: about two white keys. Who
+reaches farther misses the notes that follow."""
 _UNREACHABLE = 1e3
 """Cost of a finger farther away than that; greater than the sum of all others."""
 _END_MARGIN = 0.012
@@ -47,7 +49,8 @@ def assign_fingers(
 
     Returns:
         The points (2, 6, 3), fingertips that press at z = 0 on their keys and all others at hover
-        height, and the key of each finger (2, 5), -1 for none.
+        height, moved along the keyboard by the mean of what their hand's pressing fingers are; and
+        the key of each finger (2, 5), -1 for none.
     """
     centres = key_centres()
     held = (previous >= 0) & goal[np.maximum(previous, 0)]
@@ -66,8 +69,12 @@ def assign_fingers(
         for row, column in zip(rows, columns, strict=True):
             if distance[row, column] <= _MAX_DISTANCE:
                 finger_key.reshape(-1)[free[row]] = keys[column]
-    assigned = onto_keys(flat_heights(points, finger_key), finger_key)
-    return assigned, finger_key
+    moved = points.copy()
+    for hand, pressing in enumerate(finger_key >= 0):
+        if pressing.any():
+            away = centres[finger_key[hand, pressing], 1] - points[hand, 1:][pressing, 1]
+            moved[hand, :, 1] += away.mean()
+    return onto_keys(flat_heights(moved, finger_key), finger_key), finger_key
 
 
 def onto_keys(points: NDArray[np.float64], finger_key: NDArray[np.int8]) -> NDArray[np.float64]:
