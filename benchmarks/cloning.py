@@ -21,7 +21,7 @@ from pianomime.learn.data.dataset import read_demonstrations, validation_demonst
 from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.plan.hand_path import make_feasible
 from pianomime.players.player import PlannedPlayer
-from pianomime.policies.finger_assignment import flat_heights
+from pianomime.policies.finger_assignment import flat_plan
 from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.sampler import Sampler
 from pianomime.track import DynamicTracker, IkTracker, Tracker
@@ -35,7 +35,7 @@ def score(demonstration: Demonstration, tracker: str) -> dict[str, float]:
     if kind != _AS_RECORDED:
         plan = make_feasible(demonstration.plan)
         if name != "dynamic":
-            plan = replace(plan, fingertips=flat_heights(plan.fingertips, plan.finger_key))
+            plan = flat_plan(plan)
         demonstration = replace(demonstration, plan=plan)
     player = PlannedPlayer(name, DemonstrationPlanner(demonstration), _tracker(name))
     performance = player.play(demonstration.score)

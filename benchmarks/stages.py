@@ -23,10 +23,10 @@ import numpy as np
 import common
 from pianomime import Score, excerpt, load_player
 from pianomime.plan import FingertipPlan
-from pianomime.plan.hand_path import hand_paths
+from pianomime.plan.hand_path import hand_paths, make_feasible
 from pianomime.players.builtin import ZERO_SHOT_20HZ
 from pianomime.players.player import PlannedPlayer, Player
-from pianomime.policies.fingertip_policy import LearnedPlanner
+from pianomime.policies.fingertip_policy import predicted_plan
 from pianomime.policies.methods import SAMPLERS, THREE_STAGE, load_stages, policy_path
 from pianomime.policies.network_file import load_policy
 from pianomime.policies.three_stage.fingering import FingeringRollout
@@ -62,10 +62,13 @@ class NetworkPlanner:
         return FingertipPlan(points, keys, nobody, nobody)
 
 
-def places_by_the_network() -> Player:
-    """The high-level policy and, in the place of the low-level one, the tracker."""
-    policy = load_policy(policy_path("high-diff"), SAMPLERS[0])
-    return PlannedPlayer("places", LearnedPlanner(policy), DynamicTracker())
+class PredictedPlanner:
+    """Plans with the high-level policy of `two-stage-diff`."""
+
+    def plan(self, score: Score) -> FingertipPlan:
+        """As `Planner.plan`; where the robot's hands can be."""
+        policy = load_policy(policy_path("high-diff"), SAMPLERS[0])
+        return make_feasible(predicted_plan(score, policy))
 
 
 TWO_STAGE = "two-stage-diff"
@@ -80,7 +83,9 @@ PLAYERS: dict[str, dict[str, Callable[[], Player]]] = {
     },
     TWO_STAGE: {
         ZERO_SHOT_20HZ: partial(load_player, ZERO_SHOT_20HZ, 0),
-        "fingertips by the network": places_by_the_network,
+        "fingertips by the network": lambda: PlannedPlayer(
+            "tips", PredictedPlanner(), DynamicTracker()
+        ),
         f"and controls: {TWO_STAGE}": partial(load_player, TWO_STAGE, 0),
         "and fingertips as predicted": partial(
             load_player, TWO_STAGE, 0, planner={"feasible": False}
@@ -118,7 +123,11 @@ def main() -> None:
         for name, mine in zip(PLAYERS[arguments.method], zip(*found, strict=True), strict=True)
     ]
     common.table(["player", *METRICS], rows)
-    common.report(arguments.output, facts, {"songs": [song.name for song in songs], "rows": rows})
+    common.report(
+        arguments.output,
+        facts,
+        {"method": arguments.method, "songs": [song.name for song in songs], "rows": rows},
+    )
 
 
 if __name__ == "__main__":

@@ -8,9 +8,9 @@ from pianomime.errors import InputError
 from pianomime.music import Score
 from pianomime.plan import ZeroShotPlanner
 from pianomime.players import rollout
-from pianomime.players.generalist import GeneralistPlayer
+from pianomime.players.generalist import GeneralistPlayer, PredictionConfig
 from pianomime.policies.features import action_reference, relative_to_wrist, to_world_frame
-from pianomime.policies.fingertip_policy import LearnedPlanner, LearnedPlannerConfig
+from pianomime.policies.fingertip_policy import predicted_plan
 from pianomime.policies.methods import METHODS, WEIGHTS
 from pianomime.policies.policy_tracker import PolicyTracker
 from pianomime.world import World
@@ -44,9 +44,11 @@ class Pointing(Still):
         return action.reshape(1, 4, 36)
 
 
-def play(low, high=None):
+def play(low, high=None, feasible=False):
     tracker = PolicyTracker(low, fingertips=high is not None)
-    return GeneralistPlayer("made up", tracker, high).play(SCORE)
+    return GeneralistPlayer("made up", tracker, high, prediction=PredictionConfig(feasible)).play(
+        SCORE
+    )
 
 
 def test_the_plan_that_is_kept_is_what_was_wanted_on_the_way():
@@ -110,7 +112,12 @@ def test_a_policy_controller_asked_twice_answers_the_same():
 
 
 def test_a_plan_that_somebody_holds_does_not_grow():
-    player = GeneralistPlayer("made up", PolicyTracker(Still("low")), Pointing("high"))
+    player = GeneralistPlayer(
+        "made up",
+        PolicyTracker(Still("low")),
+        Pointing("high"),
+        prediction=PredictionConfig(feasible=False),
+    )
     controller, world = player.start(SCORE), World()
     early = controller.plan
     kept = early.finger_key.copy()
@@ -128,17 +135,15 @@ def test_what_is_told_from_wrists_is_taken_back():
 
 
 def test_a_song_that_is_planned_ahead_is_what_would_be_wanted_on_the_way():
-    predicted = LearnedPlannerConfig(feasible=False)
-    ahead = LearnedPlanner(Pointing("high"), config=predicted).plan(SCORE)
+    ahead = predicted_plan(SCORE, Pointing("high"))
     way = play(Still("low"), Pointing("high")).plan
     for name in ("fingertips", "finger_key", "note_hand", "note_finger"):
         np.testing.assert_array_equal(getattr(ahead, name), getattr(way, name))
 
 
 def test_predicted_fingers_keep_their_keys_where_hands_can_be():
-    predicted = LearnedPlannerConfig(feasible=False)
-    raw = LearnedPlanner(Pointing("high"), config=predicted).plan(SCORE)
-    feasible = LearnedPlanner(Pointing("high")).plan(SCORE)
+    raw = predicted_plan(SCORE, Pointing("high"))
+    feasible = play(Still("low"), Pointing("high"), feasible=True).plan
     for name in ("finger_key", "note_hand", "note_finger"):
         np.testing.assert_array_equal(getattr(feasible, name), getattr(raw, name))
     assert not np.allclose(feasible.fingertips, raw.fingertips)
@@ -152,3 +157,16 @@ def test_feasible_fingertips_are_played_better():
         scores = [excerpt(Score.from_midi(songs.path(name)), seconds=10) for name in SONGS]
         means.append(np.mean([player.play(score).metrics()["f1"] for score in scores]))
     assert means[0] > means[1] + 0.02
+
+
+def test_the_low_level_sees_all_goals_also_those_that_nobody_was_given():
+    high, low = Still("high"), Still("low")
+    play(low, high, feasible=True)
+    roll = np.vstack([SCORE.roll(), np.zeros((4, 88), bool)])
+    for frame, observation in enumerate(low.observations):
+        np.testing.assert_array_equal(observation["goal"][0], roll[frame : frame + 4])
+
+
+def test_only_players_of_two_stages_predict_fingertips():
+    with pytest.raises(InputError, match=r"there is no setting 'planner\.feasible'"):
+        load_player("bc-mse", 0, planner={"feasible": False})

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import tyro
 
@@ -16,6 +16,9 @@ from pianomime.shown import shown
 if TYPE_CHECKING:
     from pianomime.learn.data.episode import Episode
     from pianomime.progress import Progress
+
+
+_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
@@ -64,19 +67,20 @@ class CollectDagger:
 
         if self.jobs is not None:
             within("jobs", self.jobs, 1)
-        self._check_needs()
+        songs = self._songs()
+        self._check_needs(songs)
         f1: list[float] = []
         with extra("train"), bars() as progress:
             progress("loading", 0, 0)
             from pianomime.learn.data.trajectories import write_trajectories
 
             # Closed at once where the work is stopped, and with it the processes.
-            with closing(self._episodes(progress, f1)) as episodes:
+            with closing(self._episodes(songs, progress, f1)) as episodes:
                 number = write_trajectories(self.out, episodes)
-        print(f"demonstrations played: {number}, at a mean F1 of {sum(f1) / number:.3f}")
+        print(f"played: {number}, at a mean F1 of {sum(f1) / number:.3f}")
         print(f"saved: {shown(self.out)}")
 
-    def _check_needs(self) -> None:
+    def _check_needs(self, songs: list[Path]) -> None:
         from pianomime.commands.needs import (
             need_demonstrations,
             need_packages,
@@ -84,7 +88,7 @@ class CollectDagger:
         )
 
         need_packages("train")
-        if not self._songs():
+        if not songs:
             need_demonstrations(self.demonstrations)
         need_place_for_data_set(self.out)
         if self.config.rollout_policy is not None or self.config.fingertip_policy is not None:
@@ -93,26 +97,40 @@ class CollectDagger:
             check_policies(self.config)
 
     def _songs(self) -> list[Path]:
-        """The MIDI files whose fingertips are predicted; none where there are demonstrations."""
-        from pianomime.songs.find import MIDI_SUFFIXES, find_songs
+        """The MIDI files whose fingertips are to be predicted; none if there are demonstrations."""
+        from pianomime.errors import InputError
+        from pianomime.songs.find import MIDI_SUFFIXES, files_below
 
-        source = self.demonstrations
-        if self.config.fingertip_policy is None or next(source.rglob("*.npz"), None):
+        source, songs = self.demonstrations, list[Path]()
+        if source.is_dir() and next(source.rglob("*.npz"), None) is None:
+            with suppress(InputError):
+                songs = files_below(source, MIDI_SUFFIXES, "MIDI files")
+        elif source.suffix.lower() in MIDI_SUFFIXES and source.is_file():
+            songs = [source]
+        if not songs:
             return []
-        midi = source.is_dir() or source.suffix.lower() in MIDI_SUFFIXES
-        return find_songs([source]) if midi else []
+        if self.config.fingertip_policy is None:
+            raise InputError(
+                f"{source}: MIDI files have no fingertips; name a policy that predicts them with "
+                "--fingertip-policy"
+            )
+        return self._some(songs)
 
-    def _episodes(self, progress: Progress, f1: list[float]) -> Generator[Episode, None, None]:
+    def _some(self, all_of_them: list[_Item]) -> list[_Item]:
+        """As many as are wanted, evenly spread."""
+        limit = self.config.max_demonstrations
+        return all_of_them[:: -(-len(all_of_them) // limit)] if limit else all_of_them
+
+    def _episodes(
+        self, songs: list[Path], progress: Progress, f1: list[float]
+    ) -> Generator[Episode, None, None]:
         from pianomime.learn.data.dagger import collect_dagger, songs_without_plan
         from pianomime.learn.data.dataset import read_demonstrations
 
-        songs = self._songs()
-        demonstrations = (
-            songs_without_plan(songs) if songs else read_demonstrations(self.demonstrations)
-        )
-        limit = self.config.max_demonstrations
-        if limit:
-            demonstrations = demonstrations[:: -(-len(demonstrations) // limit)]
+        if songs:
+            demonstrations = songs_without_plan(songs)
+        else:
+            demonstrations = self._some(read_demonstrations(self.demonstrations))
         with closing(collect_dagger(demonstrations, self.config, self.jobs)) as episodes:
             progress("playing", 0, len(demonstrations))
             for done, episode in enumerate(episodes, 1):

@@ -144,13 +144,14 @@ def hand_paths(
 
 
 def make_feasible(plan: FingertipPlan, config: HandPathConfig | None = None) -> FingertipPlan:
-    """Retarget a human's plan to the robot's hands: the same fingers on the same keys.
+    """Retarget a plan to the robot's hands: the same fingers on the same keys.
 
-    Human hands have other proportions, and their tracking is inexact. Fingering is kept as it is;
-    fingertip positions are only a soft target of the wrists and of idle fingers.
+    Human hands have other proportions, and their tracking is inexact; so are predictions.
+    Fingering is kept as it is; fingertip positions are only a soft target of the wrists and of idle
+    fingers.
 
     Args:
-        plan: the human's plan.
+        plan: that of a human, or of a high-level policy.
         config: heights and weights.
     """
     feasible = hand_paths(plan.finger_key, config, plan.fingertips)

@@ -14,11 +14,10 @@ from pianomime.plan.demonstration import (
     DemonstrationPlanner,
 )
 from pianomime.plan.fingering_cost import FingeringConfig
-from pianomime.players.generalist import GeneralistPlayer, ThreeStagePlayer
+from pianomime.players.generalist import GeneralistPlayer, PredictionConfig, ThreeStagePlayer
 from pianomime.players.player import PlannedPlayer, Player
 from pianomime.players.receding_horizon import HorizonConfig, RecedingHorizonPlayer
 from pianomime.players.settings import PlayerFactory, configure
-from pianomime.policies.fingertip_policy import LearnedPlanner, LearnedPlannerConfig
 from pianomime.policies.methods import (
     FINGERS,
     GENERALISTS,
@@ -190,25 +189,21 @@ def _generalist(method: str) -> PlayerFactory:
         **settings: Any,
     ) -> Player:
         configs = _generalist_configs(method, effort)
-        sampler, *planners = configure(settings, **configs)
+        sampler, *prediction = configure(settings, **configs)
         *high, low = zip(GENERALISTS[method], weight_files(method, weights), strict=True)
         tracker = load_policy_tracker(low[1], sampler, seed, low[0])
-        if not high:
-            return GeneralistPlayer(method, tracker, None, seed, effort, world)
-        policy = load_policy(high[0][1], sampler, high[0][0])
-        if not planners[0].feasible:
-            return GeneralistPlayer(method, tracker, policy, seed, effort, world)
-        planner = LearnedPlanner(policy, seed, planners[0])
-        return PlannedPlayer(method, planner, tracker, effort, world=world)
+        fingertips = load_policy(high[0][1], sampler, high[0][0]) if high else None
+        player = GeneralistPlayer(method, tracker, fingertips, seed, effort, world=world)
+        return replace(player, prediction=prediction[0]) if prediction else player
 
     return make
 
 
 def _generalist_configs(method: str, effort: int) -> dict[str, Any]:
-    """The configs of a generalist by group: only one of two stages plans."""
+    """The configs of a generalist by group: only one of two stages predicts fingertips."""
     sampler = {"sampler": SAMPLERS[effort]}
     two_stages = len(GENERALISTS[method]) == 2
-    return {**sampler, "planner": LearnedPlannerConfig()} if two_stages else sampler
+    return {**sampler, "planner": PredictionConfig()} if two_stages else sampler
 
 
 FACTORIES: dict[str, PlayerFactory] = {

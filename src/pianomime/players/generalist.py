@@ -1,14 +1,17 @@
-"""The players of learned policies that plan while they play."""
+"""The players of learned policies alone, which need no planner."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from pianomime.music import Score
+from pianomime.plan.hand_path import make_feasible
 from pianomime.players.player import Player
+from pianomime.policies.finger_assignment import flat_plan
+from pianomime.policies.fingertip_policy import predicted_plan
 from pianomime.policies.generalist import OneStageController, TwoStageController
 from pianomime.policies.policy import Policy
-from pianomime.policies.policy_tracker import PolicyTracker
+from pianomime.policies.policy_tracker import PolicyController, PolicyTracker
 from pianomime.policies.three_stage.controller import Stages, ThreeStageController
 from pianomime.short_repr import short_repr
 from pianomime.track import Controller
@@ -16,8 +19,17 @@ from pianomime.world_names import PAPER
 
 
 @dataclass(frozen=True)
+class PredictionConfig:
+    """How predicted fingertips are followed."""
+
+    feasible: bool = True
+    """Predict the whole song, and move fingertips to where the robot's hands can be, see
+    `make_feasible`; otherwise they are predicted while it is played, and followed as they are."""
+
+
+@dataclass(frozen=True)
 class GeneralistPlayer(Player):
-    """Plays any score with learned policies, closed loop.
+    """Plays any score with learned policies; controls are decided in every frame anew.
 
     Attributes:
         name: what reports call it.
@@ -25,6 +37,7 @@ class GeneralistPlayer(Player):
         high: the fingertip policy; None for a policy of one stage.
         seed: of the fingertip policy's sampling.
         effort: how many steps a diffusion is sampled in, 0 to 3.
+        prediction: how the fingertips of a policy of two stages are followed.
         world: see `Player`; the policies were trained in the paper's.
     """
 
@@ -33,16 +46,20 @@ class GeneralistPlayer(Player):
     high: Policy | None = None
     seed: int = 0
     effort: int = 0
+    prediction: PredictionConfig = PredictionConfig()
     world: str = PAPER
 
     def __repr__(self) -> str:
         return short_repr(self, repr(self.name), f"effort {self.effort}")
 
     def start(self, score: Score) -> Controller:
-        """Load nothing, plan nothing: everything happens frame by frame."""
+        """Predict the fingertips of the whole score, where there are two stages."""
         if self.high is None:
             return OneStageController(score, self.low)
-        return TwoStageController(score, self.high, self.low, self.seed)
+        if not self.prediction.feasible:
+            return TwoStageController(score, self.high, self.low, self.seed)
+        plan = flat_plan(make_feasible(predicted_plan(score, self.high, self.seed)))
+        return PolicyController(plan, self.low, score.roll())
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ moves along with it, so that the next prediction begins where the hand has to be
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from pianomime.keyboard import BLACK, NO_KEY
-from pianomime.plan.fingertip_plan import HOVER_HEIGHT
+from pianomime.plan.fingertip_plan import HOVER_HEIGHT, FingertipPlan
 from pianomime.world.layout import FINGER_COUNT
 from pianomime.world.parameters import key_centres, key_half_sizes
 
@@ -23,7 +24,7 @@ _PRESS_HEIGHT = 0.5 * HOVER_HEIGHT
 _PRESS_BONUS = 0.02
 """[m] Distance taken off the cost of a finger that was predicted to press."""
 _MAX_DISTANCE = 0.045
-"""[m] along the keyboard beyond which no finger is assigned to a key: about two white keys. Who
+"""[m] along the keyboard beyond which no finger is given a new key: about two white keys. Who
 reaches farther misses the notes that follow."""
 _UNREACHABLE = 1e3
 """Cost of a finger farther away than that; greater than the sum of all others."""
@@ -49,8 +50,8 @@ def assign_fingers(
 
     Returns:
         The points (2, 6, 3), fingertips that press at z = 0 on their keys and all others at hover
-        height, moved along the keyboard by the mean of what their hand's pressing fingers are; and
-        the key of each finger (2, 5), -1 for none.
+        height; and the key of each finger (2, 5), -1 for none. Where fingers of a hand press, its
+        other points are moved along the keyboard as far as these are in the mean.
     """
     centres = key_centres()
     held = (previous >= 0) & goal[np.maximum(previous, 0)]
@@ -111,3 +112,8 @@ def flat_heights(points: NDArray[Any], finger_key: NDArray[np.int8]) -> NDArray[
     flat[..., 2] = HOVER_HEIGHT
     flat[..., 1:, 2][finger_key >= 0] = 0.0
     return flat
+
+
+def flat_plan(plan: FingertipPlan) -> FingertipPlan:
+    """A plan as low-level policies follow it, with heights as of `flat_heights`."""
+    return replace(plan, fingertips=flat_heights(plan.fingertips, plan.finger_key))

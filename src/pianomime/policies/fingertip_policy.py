@@ -1,8 +1,6 @@
-"""Receding-horizon rollout of the high-level fingertip policy, and a planner of whole songs."""
+"""The high-level fingertip policy, rolled out frame by frame on its own predictions."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +8,8 @@ from numpy.typing import NDArray
 from pianomime.keyboard import KEYS, NO_KEY
 from pianomime.music import Score
 from pianomime.plan import FingertipPlan
-from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.features import fingertip_observation, rest_points, to_world_frame
-from pianomime.policies.finger_assignment import assign_fingers, flat_heights
+from pianomime.policies.finger_assignment import assign_fingers
 from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
 from pianomime.policies.policy import Policy
 from pianomime.progress import Steps
@@ -57,53 +54,23 @@ class FingertipRollout:
         return targets
 
 
-@dataclass(frozen=True)
-class LearnedPlannerConfig:
-    """How predicted fingertips are followed."""
-
-    feasible: bool = True
-    """Predict the whole song, and move fingertips to where the robot's hands can be, see
-    `make_feasible`; otherwise they are predicted while it is played, and followed as they are."""
-
-
-class LearnedPlanner:
-    """Plans a whole song before it is played, as the published code does.
+def predicted_plan(score: Score, policy: Policy, seed: int = 0) -> FingertipPlan:
+    """The fingertips of a whole song before it is played, as the published code predicts them.
 
     Args:
+        score: what is to be played.
         policy: the fingertip policy.
         seed: of its sampling.
-        config: whether fingertips are made feasible.
-    """
-
-    def __init__(
-        self, policy: Policy, seed: int = 0, config: LearnedPlannerConfig | None = None
-    ) -> None:
-        self._policy, self._seed = policy, seed
-        self._config = config or LearnedPlannerConfig()
-
-    def plan(self, score: Score) -> FingertipPlan:
-        """One row for each frame of `score.roll()`."""
-        rollout, steps = FingertipRollout(score, self._policy, self._seed), score.frames()
-        told = Steps("fingertips", steps)
-        for frame in range(steps):
-            rollout.step(frame)
-            told.advance(1)
-        plan = rollout.plan.plan()
-        return feasible_targets(plan) if self._config.feasible else plan
-
-
-def feasible_targets(plan: FingertipPlan) -> FingertipPlan:
-    """A plan with fingertips where the robot's hands can be, as low-level policies follow it.
-
-    Args:
-        plan: the fingertips of a human, or of a high-level policy.
 
     Returns:
-        The same fingers on the same keys, see `make_feasible`, with heights that tell alone which
-        fingers press, see `flat_heights`.
+        A plan with one row for each frame of `score.roll()`, see `assign_fingers`.
     """
-    feasible = make_feasible(plan)
-    return replace(feasible, fingertips=flat_heights(feasible.fingertips, feasible.finger_key))
+    rollout, frames = FingertipRollout(score, policy, seed), score.frames()
+    told = Steps("fingertips", frames)
+    for frame in range(frames):
+        rollout.step(frame)
+        told.advance(1)
+    return rollout.plan.plan()
 
 
 class PlanRecord:

@@ -1,4 +1,4 @@
-"""Closed-loop generalists: fingertips and controls are planned anew in every frame."""
+"""Generalists frame by frame: fingertips are predicted while controls are played."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class OneStageController:
 
     @property
     def plan(self) -> FingertipPlan:
-        """Where the hands were so far, and the finger nearest to each goal: nothing was planned."""
+        """Where the hands were so far, and whom `assign_fingers` gave each key: no policy did."""
         return self._record.plan()
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:

@@ -74,14 +74,21 @@ class PolicyController:
     Args:
         plan: what is followed.
         tracker: whose policy acts.
+        goal: (T, 88) bool, the keys that should be down; those that the plan presses if None.
     """
 
     replayable: ClassVar[bool] = True
 
-    def __init__(self, plan: FingertipPlan, tracker: PolicyTracker) -> None:
+    def __init__(
+        self,
+        plan: FingertipPlan,
+        tracker: PolicyTracker,
+        goal: NDArray[np.bool_] | None = None,
+    ) -> None:
         self.plan = plan
         self._tracker = tracker
-        self._goal = np.vstack([plan.keys(), np.zeros((CHUNK - 1, KEYS), bool)])
+        wanted = plan.keys() if goal is None else goal
+        self._goal = np.vstack([wanted, np.zeros((CHUNK - 1, KEYS), bool)])
 
     def control(self, frame: int, world: World) -> NDArray[np.float64]:
         """(46,) right then left [rad, m]."""

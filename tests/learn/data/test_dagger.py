@@ -124,18 +124,56 @@ def test_songs_without_demonstrations_are_played_with_predicted_fingertips(tmp_p
     score = Score([40, 44], [0.0, 0.5], [0.4, 1.0], [80, 80])
     for name in ("one.mid", "two.mid"):
         score.to_midi(folder / name)
+    (folder / "zero.mid").write_bytes(b"MThd")
+    (folder / "three.musicxml").write_text("<score-partwise/>")
     policy = str(weights_folder() / "high-diff.onnx")
-    with pytest.raises(SystemExit):
-        cli.main(["collect-dagger", str(folder), "-o", str(out)])
-    assert "no demonstrations (.npz)" in capsys.readouterr().err
     cli.main(
         ["collect-dagger", str(folder), "-o", str(out), "--jobs", "1", "--fingertip-policy", policy]
     )
-    assert "played: 2," in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert [told.err.count(name) for name in ("zero.mid", ".musicxml")] == [1, 1]
+    assert "played: 2," in told.out
     data = TrajectoryData.open(out)
     assert len({episode["song_id"] for episode in data.episodes}) == 1, "the same music"
     pressed = data.columns(0, ["finger_key"])["finger_key"]
     assert set(np.unique(pressed)) >= {-1, 40, 44}
+
+
+def test_of_songs_only_those_that_are_played_are_read(tmp_path, capsys):
+    Score([40], [0.0], [0.4], [80]).to_midi(tmp_path / "a.mid")
+    for name in ("b.mid", "c.mid"):
+        (tmp_path / name).write_bytes(b"MThd")
+    cli.main(
+        ["collect-dagger", str(tmp_path), "-o", str(tmp_path / "one.zarr"), "--jobs", "1"]
+        + ["--fingertip-policy", str(weights_folder() / "high-diff.onnx")]
+        + ["--max-demonstrations", "1"]
+    )
+    assert "played: 1," in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("song.mid", [], "name a policy that predicts them with --fingertip-policy"),
+        (".", [], "name a policy that predicts them with --fingertip-policy"),
+        ("empty", ["--fingertip-policy", "x.onnx"], "holds no demonstrations (.npz)"),
+        ("data.zarr", ["--fingertip-policy", "x.onnx"], "is a zarr data set"),
+    ],
+)
+def test_what_holds_no_fingertips_is_refused_in_one_line(
+    name, options, message, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    Score([40], [0.0], [0.4], [80]).to_midi(tmp_path / "song.mid")
+    for folder in ("empty", "data.zarr"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "data.zarr" / ".zgroup").write_text("{}")
+    with pytest.raises(SystemExit) as error:
+        cli.main(["collect-dagger", name, *options])
+    assert error.value.code == 2
+    told = capsys.readouterr().err
+    assert message in told
+    assert len(told.strip().splitlines()) == 1
 
 
 def test_another_seed_draws_otherwise(two_notes):

@@ -21,10 +21,10 @@ from pianomime.cli import main
 from pianomime.errors import InputError, WorkFailed
 from pianomime.learn.data import perform as factory
 from pianomime.learn.data.dataset import trajectory_dataset
-from pianomime.learn.data.episode import COLUMNS
+from pianomime.learn.data.episode import COLUMNS, song_number
 from pianomime.learn.data.parts import load_part, parts_folder, parts_in
 from pianomime.learn.data.perform import perform
-from pianomime.learn.data.perform_worker import load_perform_worker, song_number
+from pianomime.learn.data.perform_worker import load_perform_worker
 from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.track import IkTracker
 from pianomime.world import World

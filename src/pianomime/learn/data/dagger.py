@@ -11,30 +11,32 @@ imitation learning", 2017).
 from __future__ import annotations
 
 import pickle
+import warnings
 from collections.abc import Generator, Sequence
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from pianomime.errors import InputError, WorkFailed
 from pianomime.learn.data.dagger_config import DaggerConfig
-from pianomime.learn.data.episode import Episode, base_controls, fill_columns, record
+from pianomime.learn.data.episode import (
+    Episode,
+    base_controls,
+    fill_columns,
+    record,
+    song_number,
+)
 from pianomime.learn.data.noisy_controller import NoisyController, noise_spread
-from pianomime.learn.data.perform_worker import song_number
 from pianomime.music import Score
 from pianomime.music.excerpt import excerpt
 from pianomime.plan.demonstration import Demonstration
 from pianomime.plan.hand_path import make_feasible
-from pianomime.policies.finger_assignment import flat_heights
-from pianomime.policies.fingertip_policy import (
-    LearnedPlanner,
-    LearnedPlannerConfig,
-    PlanRecord,
-)
+from pianomime.policies.finger_assignment import flat_plan
+from pianomime.policies.fingertip_policy import PlanRecord, predicted_plan
 from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.network_file import load_policy
+from pianomime.policies.policy_tracker import PolicyController
 from pianomime.policies.sampler import Sampler
 from pianomime.staging import scratch
 from pianomime.track import DynamicTracker, IkTracker
@@ -53,7 +55,8 @@ def collect_dagger_episode(
 
     The expert is the dynamic tracker. The fingertips, the demonstration's or those that a
     high-level policy predicts, are first made feasible for the robot's hands (`make_feasible`):
-    these are what high levels learn to predict and low levels to reach.
+    these are what high levels learn to predict and low levels to reach. They are recorded with
+    heights that tell alone which press (`flat_heights`).
 
     Args:
         demonstration: what to play.
@@ -69,14 +72,13 @@ def collect_dagger_episode(
     score = demonstration.score
     plan = demonstration.plan
     if config.fingertip_policy is not None:
-        predicted = LearnedPlannerConfig(feasible=False)
-        policy = load_policy(config.fingertip_policy, _FAST)
-        plan = LearnedPlanner(policy, seeds[1], predicted).plan(score)
+        plan = predicted_plan(score, load_policy(config.fingertip_policy, _FAST), seeds[1])
     feasible = make_feasible(plan)
-    plan = replace(feasible, fingertips=flat_heights(feasible.fingertips, feasible.finger_key))
+    plan = flat_plan(feasible)
     played = None
     if config.rollout_policy is not None:
-        played = load_policy_tracker(config.rollout_policy, _FAST, seeds[0]).start(plan)
+        tracker = load_policy_tracker(config.rollout_policy, _FAST, seeds[0])
+        played = PolicyController(plan, tracker, score.roll())
     expert = DynamicTracker().start(feasible)
     controller = NoisyController(expert, played, spread, config.noise_correlation, rng)
     columns, qpos, events, _ = record(controller, score)
@@ -90,17 +92,24 @@ def songs_without_plan(paths: Sequence[Path]) -> list[Demonstration]:
     """Songs whose fingertips a high-level policy is to predict; until then hands rest.
 
     Args:
-        paths: of MIDI files, of which the first 30 s are taken.
+        paths: of MIDI files, of which the first 30 s are taken; a warning tells of each that
+            cannot be read, or holds no notes.
 
     Raises:
-        InputError: one cannot be read.
+        InputError: that is so of all of them.
     """
     demonstrations = []
     for path in paths:
-        whole = Score.from_midi(path)
-        score = excerpt(whole)
+        try:
+            whole = Score.from_midi(path)
+            score = excerpt(whole)
+        except InputError as error:
+            warnings.warn(f"passed over: {error}", stacklevel=2)
+            continue
         plan, song_id = PlanRecord(score).plan(), song_number(whole)
         demonstrations.append(Demonstration(score, plan, path.name, song_id=song_id))
+    if not demonstrations:
+        raise InputError("none of these songs can be played")
     return demonstrations
 
 

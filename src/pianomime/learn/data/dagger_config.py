@@ -27,7 +27,8 @@ class DaggerConfig:
     fingertip_policy: Annotated[
         Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")
     ] = None
-    """High-level policy (.onnx) whose fingertips are followed; the human's if not given."""
+    """High-level policy (.onnx) whose fingertips are followed, made feasible; the human's if not
+    given."""
     max_demonstrations: int = 0
     """Number of demonstrations to play, evenly spread over all; 0 for all."""
     seed: int = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,6 +23,11 @@ from pianomime.world_names import PAPER
 
 if TYPE_CHECKING:
     from pianomime.learn.expert.expert_run import ExpertRun
+
+_ID_BYTES = 6
+"""Bytes of a song's number: all programs hold whole numbers of 48 bits exactly."""
+_MILLISECONDS = 1000
+"""In a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,3 +295,17 @@ def fill_columns(
     columns["finger_key"][:] = finger_key
     columns["residual"][:] = columns["action"] - columns["base_control"]
     return frame_metrics(goal, columns["pressed"]).f1
+
+
+def song_number(score: Score) -> int:
+    """A number that is the same for files of the same music: of its keys in their order.
+
+    Tempo, loudness, pedal and title make no difference.
+
+    Args:
+        score: of the whole piece.
+    """
+    # Keys that go down together are in one order, whichever the file has them in.
+    order = np.lexsort((score.key, np.rint(score.onset * _MILLISECONDS)))
+    digest = hashlib.sha256(score.key[order].astype(np.uint8).tobytes()).digest()
+    return int.from_bytes(digest[:_ID_BYTES], "big")

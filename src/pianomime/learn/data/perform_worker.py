@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,14 @@ import numpy as np
 from pianomime import __version__
 from pianomime.errors import InputError
 from pianomime.learn.data.dagger_config import DaggerConfig
-from pianomime.learn.data.episode import Episode, Source, base_controls, fill_columns, record
+from pianomime.learn.data.episode import (
+    Episode,
+    Source,
+    base_controls,
+    fill_columns,
+    record,
+    song_number,
+)
 from pianomime.learn.data.noisy_controller import NoisyController, noise_spread
 from pianomime.learn.data.parts import save_part
 from pianomime.music import Score
@@ -25,11 +31,6 @@ from pianomime.workers import Answer, Row
 
 PERFORM_WORKER = "pianomime.learn.data.perform_worker:load_perform_worker"
 """`load_perform_worker`, for `pianomime.workers`."""
-
-_ID_BYTES = 6
-"""Bytes of a song's number: all programs hold whole numbers of 48 bits exactly."""
-_MILLISECONDS = 1000
-"""In a second."""
 
 
 @dataclass(frozen=True)
@@ -128,17 +129,3 @@ def play_as_episode(
     base = base_controls(IkTracker().start(plan), qpos)
     f1 = fill_columns(columns, base, score.roll(), plan.fingertips, plan.finger_key)
     return Episode(source.title, f1, "ik", columns, song_id, split, player.world, events, source)
-
-
-def song_number(score: Score) -> int:
-    """A number that is the same for files of the same music: of its keys in their order.
-
-    Tempo, loudness, pedal and title make no difference.
-
-    Args:
-        score: of the whole piece.
-    """
-    # Keys that go down together are in one order, whichever the file has them in.
-    order = np.lexsort((score.key, np.rint(score.onset * _MILLISECONDS)))
-    digest = hashlib.sha256(score.key[order].astype(np.uint8).tobytes()).digest()
-    return int.from_bytes(digest[:_ID_BYTES], "big")
