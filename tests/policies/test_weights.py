@@ -60,7 +60,7 @@ def test_fingers_add_something() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "least"), [("fingers", 0.85), ("three-stage", 0.8), ("two-stage-diff", 0.3)]
+    ("name", "least"), [("fingers", 0.85), ("three-stage", 0.8), ("two-stage-diff", 0.4)]
 )
 def test_they_play(score: Score, name: str, least: float) -> None:
     first, again = (load_player(name, 0).play(score) for _ in range(2))
