@@ -35,15 +35,20 @@ class FingertipRollout:
         self._pressing = no_keys()
         self.plan = PlanRecord(score)
 
-    def step(self, frame: int) -> NDArray[np.float64]:
-        """(4, 2, 6, 3) points [m] wanted in this frame and the next; frames come in order."""
+    def step(self, frame: int, count: int = CHUNK) -> NDArray[np.float64]:
+        """(H, 2, 6, 3) points [m] wanted in this frame and the next; frames come in order.
+
+        Args:
+            frame: its number.
+            count: H, frames that are asked for, of the 4 that the policy predicts.
+        """
         observation = fingertip_observation(
             self._goal[None, frame : frame + GOAL_HORIZON], self._points[None]
         )
         action = self._policy.act(observation, self._rng)[0].reshape(-1, 2, POINT_COUNT, 3)
         points = to_world_frame(action.astype(np.float64))
-        targets, pressing = np.empty((CHUNK, 2, POINT_COUNT, 3)), self._pressing
-        for ahead in range(CHUNK):
+        targets, pressing = np.empty((count, 2, POINT_COUNT, 3)), self._pressing
+        for ahead in range(count):
             targets[ahead], pressing = assign_fingers(
                 points[ahead], self._goal[frame + ahead], pressing
             )
@@ -68,7 +73,7 @@ def predicted_plan(score: Score, policy: Policy, seed: int = 0) -> FingertipPlan
     rollout, frames = FingertipRollout(score, policy, seed), score.frames()
     told = Steps("fingertips", frames)
     for frame in range(frames):
-        rollout.step(frame)
+        rollout.step(frame, count=1)
         told.advance(1)
     return rollout.plan.plan()
 
