@@ -7,7 +7,11 @@ import pytest
 
 from pianomime import cli
 from pianomime.errors import InputError
-from pianomime.learn.data.dagger import collect_dagger, collect_dagger_episode
+from pianomime.learn.data.dagger import (
+    collect_dagger,
+    collect_dagger_episode,
+    songs_without_plan,
+)
 from pianomime.learn.data.dagger_config import DaggerConfig
 from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.music import Score
@@ -198,3 +202,12 @@ def test_a_rollout_policy_that_is_damaged_is_refused(two_notes, tmp_path):
     config = DaggerConfig(rollout_policy=tmp_path / "policy.onnx")
     with pytest.raises(InputError, match="damaged"):
         next(collect_dagger([two_notes], config))
+
+
+def test_a_plan_in_which_no_finger_presses_is_refused_unless_a_policy_makes_one(
+    two_notes, tmp_path
+):
+    two_notes.score.to_midi(tmp_path / "song.mid")
+    resting = songs_without_plan([tmp_path / "song.mid"])
+    with pytest.raises(InputError, match="no finger presses a key"):
+        next(collect_dagger([two_notes, *resting], QUIET))

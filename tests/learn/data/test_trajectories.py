@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -313,7 +314,13 @@ def test_episodes_of_different_worlds_are_refused_in_one_line(tmp_path: Path) ->
     for song, world in enumerate(WORLDS):
         sources.append(tmp_path / f"{world}.zarr")
         write_trajectories(sources[-1], iter([filled(world, world, song)]))
-        assert len(trajectory_dataset(sources[-1:])) == 1
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            assert len(trajectory_dataset(sources[-1:])) == 1
+        assert [str(one.message) for one in told] == [
+            f"{sources[-1]}: played in the world {world}; "
+            f"play what learns from it with --world {world}"
+        ] * (world != "paper")
     with pytest.raises(InputError, match="a data set is of one world") as error:
         trajectory_dataset(sources)
     assert "\n" not in str(error.value)

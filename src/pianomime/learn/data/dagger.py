@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from pianomime.errors import InputError, WorkFailed
+from pianomime.keyboard import NO_KEY
 from pianomime.learn.data.dagger_config import DaggerConfig
 from pianomime.learn.data.episode import (
     Episode,
@@ -139,10 +140,16 @@ def collect_dagger(
         jobs: processes; one a core if None.
 
     Raises:
-        InputError: a policy cannot be used.
+        InputError: a policy cannot be used, or no finger presses a key in a demonstration and no
+            policy says where fingers go.
         WorkFailed: a demonstration cannot be played.
     """
     check_policies(config)
+    if config.fingertip_policy is None:
+        for demonstration in demonstrations:
+            if (demonstration.plan.finger_key == NO_KEY).all():
+                title = demonstration.score.title
+                raise InputError(f"{title}: no finger presses a key; give a fingertip policy")
     # Episodes are large, and pass through files. Nobody else can write into this folder.
     with scratch() as folder:
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import warnings
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from pianomime.plan.plan_arrays import FINGER_KEY
 from pianomime.policies.finger_assignment import flat_heights
 from pianomime.short_repr import short_repr
 from pianomime.shown import shown
+from pianomime.world_names import PAPER
 
 DEMONSTRATION_COLUMNS = ("goal", "fingertips", "finger_key")
 """Columns of data sets made of demonstrations."""
@@ -189,12 +191,23 @@ def trajectory_dataset(
                             f"{source}: {episode['name']} has the base controller "
                             f"{episode['base']}; this policy needs {base}"
                         )
-                    first = first or episode
+                    if first is None:
+                        first = episode
+                        _warn_of_other_world(source, episode["world"])
                     check_one_world(first, episode["name"], episode["world"])
                     song = _song_number(episode["song_id"], episode["name"])
                     yield episode["name"], song, data.columns(number, columns)
 
     return _concatenate(", ".join(map(str, sources)), clips())
+
+
+def _warn_of_other_world(source: Path, world: str) -> None:
+    """Players of policies play in the paper's world unless they are told otherwise."""
+    if world != PAPER:
+        warnings.warn(
+            f"{source}: played in the world {world}; play what learns from it with --world {world}",
+            stacklevel=3,
+        )
 
 
 def _concatenate(
