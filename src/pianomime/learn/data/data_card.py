@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
 from pathlib import Path
@@ -11,6 +12,8 @@ from pianomime.keyboard import FRAME_RATE
 from pianomime.learn.data.episode import COLUMNS, EVENTS, Column
 from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.shown import markdown_cell, shown
+from pianomime.songs import names
+from pianomime.songs import path as song_path
 
 _HOUR = 3600
 """Seconds."""
@@ -24,6 +27,15 @@ _SIZES = (
 )
 """Numbers of rows below which a card has one of the names that catalogues of data sets know."""
 _LARGEST = "100M<n<1B"
+
+_PUBLIC_DOMAIN = (
+    "The songs are those that are bundled with PianoMime. They are in the public domain, and so",
+    "is this data set (CC0 1.0).",
+)
+_UNKNOWN_LICENCE = (
+    "The licence of the songs is unknown to the program: that of each MIDI file holds for",
+    "what was made of it.",
+)
 
 
 def data_card(path: Path) -> str:
@@ -48,11 +60,13 @@ def data_card(path: Path) -> str:
         if settings["noise"]
         else ""
     )
+    bundled = {hashlib.sha256(song_path(name).read_bytes()).hexdigest() for name in names()}
+    free = {row["source"]["digest"] for row in data.episodes} <= bundled
     parts = ", ".join(f"{number} of the split {shown(name)}" for name, number in splits.items())
     front = [
         "---",
         f"pretty_name: {json.dumps(shown(path.name))}",
-        "license: unknown",
+        "license: cc0-1.0" if free else "license: unknown",
         "task_categories:",
         "- robotics",
         "tags:",
@@ -73,8 +87,7 @@ def data_card(path: Path) -> str:
             f"to them, {FRAME_RATE:g} times a second. Made by PianoMime {__version__} "
             "(`pianomime perform`).",
             "",
-            "The licence of the songs is unknown to the program: that of each MIDI file holds for",
-            "what was made of it.",
+            *(_PUBLIC_DOMAIN if free else _UNKNOWN_LICENCE),
             "",
             "## What it holds",
             "",
