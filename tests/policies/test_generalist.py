@@ -10,9 +10,9 @@ from pianomime.plan import ZeroShotPlanner
 from pianomime.players import rollout
 from pianomime.players.generalist import GeneralistPlayer, PredictionConfig
 from pianomime.policies.features import action_reference, relative_to_wrist, to_world_frame
-from pianomime.policies.fingertip_policy import predicted_plan
 from pianomime.policies.methods import METHODS, WEIGHTS
 from pianomime.policies.policy_tracker import PolicyTracker
+from pianomime.policies.predicted_plan import predicted_plan
 from pianomime.world import World
 from pianomime.world.parameters import key_centres
 
@@ -37,11 +37,11 @@ class Pointing(Still):
     """Puts a finger near whatever is due."""
 
     def act(self, observation, rng):
-        action = super().act(observation, rng).reshape(1, 4, 2, 6, 3)
+        action = super().act(observation, rng).reshape(-1, 4, 2, 6, 3)
         for key in np.flatnonzero(observation["goal"][0, 0]):
             hand = action[:, :, int(key > 40)]
             hand[..., 2, 1] = key_centres()[key, 1] + 0.005 - hand[..., 0, 1]
-        return action.reshape(1, 4, 36)
+        return action.reshape(-1, 4, 36)
 
 
 def play(low, high=None, feasible=False):
@@ -139,6 +139,38 @@ def test_a_song_that_is_planned_ahead_is_what_would_be_wanted_on_the_way():
     way = play(Still("low"), Pointing("high")).plan
     for name in ("fingertips", "finger_key", "note_hand", "note_finger"):
         np.testing.assert_array_equal(getattr(ahead, name), getattr(way, name))
+
+
+class Wandering(Pointing):
+    """As often as not, one hand of a candidate is far from its keys."""
+
+    def act(self, observation, rng):
+        action = super().act(observation, rng).reshape(-1, 4, 2, 6, 3)
+        away = rng.random((len(action), 2)) < 0.5
+        action[:, :, :, 0, 1] += 0.4 * away[:, None]
+        return action.reshape(-1, 4, 36)
+
+
+def test_of_several_candidates_the_one_that_fits_goes_on():
+    given = [
+        (predicted_plan(SCORE, Wandering("high"), seed, candidates).finger_key >= 0).sum()
+        for candidates in (1, 16)
+        for seed in range(4)
+    ]
+    assert np.mean(given[4:]) > np.mean(given[:4]) + 1
+    assert np.max(given[4:]) <= SCORE.roll().sum()
+
+
+def test_candidates_that_are_alike_change_nothing():
+    alone, four = (predicted_plan(SCORE, Pointing("high"), 0, number) for number in (1, 4))
+    np.testing.assert_array_equal(alone.fingertips, four.fingertips)
+    np.testing.assert_array_equal(alone.finger_key, four.finger_key)
+
+
+@pytest.mark.parametrize("number", [0, 1.5, 257])
+def test_candidates_out_of_range_are_refused(number):
+    with pytest.raises(InputError, match=r"planner\.candidates"):
+        PredictionConfig(candidates=number)
 
 
 def test_predicted_fingers_keep_their_keys_where_hands_can_be():

@@ -8,23 +8,34 @@ from pianomime.music import Score
 from pianomime.plan.hand_path import make_feasible
 from pianomime.players.player import Player
 from pianomime.policies.finger_assignment import flat_plan
-from pianomime.policies.fingertip_policy import predicted_plan
 from pianomime.policies.generalist import OneStageController, TwoStageController
 from pianomime.policies.policy import Policy
 from pianomime.policies.policy_tracker import PolicyController, PolicyTracker
+from pianomime.policies.predicted_plan import predicted_plan
 from pianomime.policies.three_stage.controller import Stages, ThreeStageController
 from pianomime.short_repr import short_repr
 from pianomime.track import Controller
+from pianomime.validation import whole_numbers, within
 from pianomime.world_names import PAPER
+
+MOST_CANDIDATES = 256
+"""All are in memory."""
 
 
 @dataclass(frozen=True)
 class PredictionConfig:
-    """How predicted fingertips are followed."""
+    """How fingertips are predicted, and followed."""
 
     feasible: bool = True
     """Predict the whole song, and move fingertips to where the robot's hands can be, see
     `make_feasible`; otherwise they are predicted while it is played, and followed as they are."""
+    candidates: int = 4
+    """Predictions of the whole song that are made side by side, of which those whose hands fit
+    their keys best go on."""
+
+    def __post_init__(self) -> None:
+        whole_numbers(self, "planner")
+        within("planner.candidates", self.candidates, 1, MOST_CANDIDATES)
 
 
 @dataclass(frozen=True)
@@ -58,7 +69,8 @@ class GeneralistPlayer(Player):
             return OneStageController(score, self.low)
         if not self.prediction.feasible:
             return TwoStageController(score, self.high, self.low, self.seed)
-        plan = flat_plan(make_feasible(predicted_plan(score, self.high, self.seed)))
+        plan = predicted_plan(score, self.high, self.seed, self.prediction.candidates)
+        plan = flat_plan(make_feasible(plan))
         return PolicyController(plan, self.low, score.roll())
 
 

@@ -12,7 +12,6 @@ from pianomime.policies.features import fingertip_observation, rest_points, to_w
 from pianomime.policies.finger_assignment import assign_fingers
 from pianomime.policies.horizon import CHUNK, GOAL_HORIZON
 from pianomime.policies.policy import Policy
-from pianomime.progress import Steps
 from pianomime.world.layout import FINGER_COUNT, POINT_COUNT
 
 
@@ -29,26 +28,22 @@ class FingertipRollout:
     """
 
     def __init__(self, score: Score, policy: Policy, seed: int = 0) -> None:
-        self._goal = np.vstack([score.roll(), np.zeros((GOAL_HORIZON, KEYS), bool)])
+        self._goal = goals_ahead(score)
         self._policy, self._rng = policy, np.random.default_rng(seed)
         self._points = rest_points()
         self._pressing = no_keys()
         self.plan = PlanRecord(score)
 
-    def step(self, frame: int, count: int = CHUNK) -> NDArray[np.float64]:
-        """(H, 2, 6, 3) points [m] wanted in this frame and the next; frames come in order.
+    def step(self, frame: int) -> NDArray[np.float64]:
+        """(4, 2, 6, 3) points [m] wanted in this frame and the next; frames come in order.
 
         Args:
             frame: its number.
-            count: H, frames that are asked for, of the 4 that the policy predicts.
         """
-        observation = fingertip_observation(
-            self._goal[None, frame : frame + GOAL_HORIZON], self._points[None]
-        )
-        action = self._policy.act(observation, self._rng)[0].reshape(-1, 2, POINT_COUNT, 3)
-        points = to_world_frame(action.astype(np.float64))
-        targets, pressing = np.empty((count, 2, POINT_COUNT, 3)), self._pressing
-        for ahead in range(count):
+        goals = self._goal[frame : frame + GOAL_HORIZON]
+        points = predict_points(self._policy, goals, self._points[None], self._rng)[0]
+        targets, pressing = np.empty((CHUNK, 2, POINT_COUNT, 3)), self._pressing
+        for ahead in range(CHUNK):
             targets[ahead], pressing = assign_fingers(
                 points[ahead], self._goal[frame + ahead], pressing
             )
@@ -59,23 +54,28 @@ class FingertipRollout:
         return targets
 
 
-def predicted_plan(score: Score, policy: Policy, seed: int = 0) -> FingertipPlan:
-    """The fingertips of a whole song before it is played, as the published code predicts them.
+def goals_ahead(score: Score) -> NDArray[np.bool_]:
+    """(T + 10, 88) goals of a score, and silence as far as the policy sees beyond its end."""
+    return np.vstack([score.roll(), np.zeros((GOAL_HORIZON, KEYS), bool)])
+
+
+def predict_points(
+    policy: Policy,
+    goals: NDArray[np.bool_],
+    points: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """(N, 4, 2, 6, 3) points that a policy predicts for a frame and the next, world frame [m].
 
     Args:
-        score: what is to be played.
         policy: the fingertip policy.
-        seed: of its sampling.
-
-    Returns:
-        A plan with one row for each frame of `score.roll()`, see `assign_fingers`.
+        goals: (10, 88) of the frame and the next.
+        points: (N, 2, 6, 3) of N candidates in the frame before [m].
+        rng: of the sampling.
     """
-    rollout, frames = FingertipRollout(score, policy, seed), score.frames()
-    told = Steps("fingertips", frames)
-    for frame in range(frames):
-        rollout.step(frame, count=1)
-        told.advance(1)
-    return rollout.plan.plan()
+    observation = fingertip_observation(np.repeat(goals[None], len(points), axis=0), points)
+    action = policy.act(observation, rng).reshape(len(points), -1, 2, POINT_COUNT, 3)
+    return np.asarray(to_world_frame(action.astype(np.float64)), np.float64)
 
 
 class PlanRecord:

@@ -34,10 +34,11 @@ from pianomime.music.excerpt import excerpt
 from pianomime.plan.demonstration import Demonstration
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.finger_assignment import flat_plan
-from pianomime.policies.fingertip_policy import PlanRecord, predicted_plan
+from pianomime.policies.fingertip_policy import PlanRecord
 from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.network_file import load_policy
 from pianomime.policies.policy_tracker import PolicyController
+from pianomime.policies.predicted_plan import predicted_plan
 from pianomime.policies.sampler import Sampler
 from pianomime.staging import scratch
 from pianomime.track import DynamicTracker, IkTracker
