@@ -15,7 +15,7 @@ SOURCE = ROOT / "src" / "pianomime"
 ROOMS = (
     (
         *("errors", "installation", "keyboard", "palette", "progress", "short_repr", "shown"),
-        *("closing", "device_names", "stop", "world_names"),
+        *("camera_names", "closing", "device_names", "stop", "world_names"),
     ),
     ("file_names", "staging", "schema", "seal"),
     ("files", "archive", "local_server", "mp4", "sealed_json", "validation", "web_page", "workers"),

@@ -30,6 +30,7 @@ class Mp4:
         sample_rate: int | None,
         crf: int = 20,
         fps: int = round(FRAME_RATE),
+        key_frame_every: int | None = None,
     ) -> None:
         """Open the file.
 
@@ -39,6 +40,8 @@ class Mp4:
             sample_rate: of its sound [Hz]; None for a silent film.
             crf: x264's constant rate factor: smaller is better and larger.
             fps: pictures per second.
+            key_frame_every: pictures from one that is encoded alone to the next, at most: with few
+                of them any picture is found soon, and the file is larger. None for x264's own.
 
         Raises:
             OSError: the file cannot be written.
@@ -53,7 +56,10 @@ class Mp4:
         self._pictures: Any = self._file.add_stream("libx264", rate=fps)
         self._pictures.width, self._pictures.height = size
         self._pictures.pix_fmt = "yuv420p"
-        self._pictures.options = {"crf": str(crf), "preset": "veryfast"}
+        options: dict[str, object] = {"crf": str(crf), "preset": "veryfast"}
+        if key_frame_every is not None:
+            options["g"] = str(key_frame_every)
+        self._pictures.options = options
         self._sound: Any = None
         if sample_rate is not None:
             self._sound = self._file.add_stream("aac", rate=sample_rate, layout="stereo")

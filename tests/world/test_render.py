@@ -7,12 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from pianomime.camera_names import CAMERAS
 from pianomime.keyboard import KEYS
 from pianomime.world import render
 from pianomime.world.model import build_spec
 from pianomime.world.parameters import key_travel
 from pianomime.world.render import RenderUnavailable, View, render_frame, write_video
-from pianomime.world.scene_look import CAMERAS, dress
+from pianomime.world.scene_look import dress
 
 POSITIONS = 142
 SMALL = (160, 68)

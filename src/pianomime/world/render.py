@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pianomime.camera_names import CAMERAS
 from pianomime.closing import Closing
 from pianomime.files import atomic
 from pianomime.keyboard import FRAME_RATE, KEYS
@@ -23,7 +24,7 @@ from pianomime.music.sound import SAMPLE_RATE
 from pianomime.music.wav import WavFile
 from pianomime.progress import Progress, no_progress
 from pianomime.world.model import build_spec
-from pianomime.world.scene_look import CAMERAS, LAMP_OFF, dress, key_colours
+from pianomime.world.scene_look import LAMP_OFF, dress, key_colours
 
 _MAX_GEOMS = 1000
 # Edges are smoothed by rendering larger and shrinking: with OpenGL in software this costs half as
@@ -59,7 +60,7 @@ class View:
     """Where a video is taken from, and its size."""
 
     camera: str = "player"
-    """One of `pianomime.world.scene_look.CAMERAS`."""
+    """One of `pianomime.camera_names.CAMERAS`."""
     size: tuple[int, int] = (1280, 544)
     """Width and height [pixels], both even for H.264."""
 
@@ -72,13 +73,16 @@ class Painter(Closing):
         height: of its pictures [pixels].
     """
 
-    def __init__(self, width: int, height: int, camera: str = "player") -> None:
+    def __init__(
+        self, width: int, height: int, camera: str = "player", smooth: bool = False
+    ) -> None:
         """Create an OpenGL context and a camera.
 
         Args:
             width: of the pictures [pixels].
             height: of the pictures [pixels].
-            camera: one of `pianomime.world.scene_look.CAMERAS`.
+            camera: one of `pianomime.camera_names.CAMERAS`.
+            smooth: whether edges are smoothed.
 
         Raises:
             RenderUnavailable: there is no working OpenGL.
@@ -90,7 +94,8 @@ class Painter(Closing):
             raise ValueError(f"a picture of {width}x{height} pixels cannot be drawn")
         backend = _backend()
         self.width, self.height = width, height
-        self._model = _dressed_model(width, height)
+        self._size = _oversize((width, height), _PICTURE_OVERSIZE if smooth else 1.0)
+        self._model = _dressed_model(*self._size)
         self._data = mujoco.MjData(self._model)
         self._keys, self._lamps = (
             np.array([self._model.geom(f"{name}_{key}").id for key in range(KEYS)])
@@ -104,10 +109,10 @@ class Painter(Closing):
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._camera.fixedcamid = self._model.camera(camera).id
-        self._rectangle = mujoco.MjrRect(0, 0, width, height)
+        self._rectangle = mujoco.MjrRect(0, 0, *self._size)
         # Not `mujoco.Renderer`: it chooses its backend when mujoco is imported, by MUJOCO_GL alone,
         # and without that variable takes one that needs a display.
-        self._gl = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
+        self._gl = importlib.import_module(f"mujoco.{backend}").GLContext(*self._size)
         self._gl.make_current()
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
@@ -140,9 +145,14 @@ class Painter(Closing):
         )
         self._gl.make_current()
         mujoco.mjr_render(self._rectangle, self._scene, self._context)
-        picture = np.empty((self.height, self.width, 3), np.uint8)
+        picture = np.empty((*reversed(self._size), 3), np.uint8)
         mujoco.mjr_readPixels(picture, None, self._rectangle, self._context)
-        return picture[::-1]  # OpenGL counts rows from below
+        picture = picture[::-1]  # OpenGL counts rows from below
+        if self._size == (self.width, self.height):
+            return picture
+        large = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+        small = large.reformat(self.width, self.height, "rgb24", interpolation=_SHRINKING)
+        return np.asarray(small.to_ndarray(), np.uint8)
 
     def close(self) -> None:
         """Free the OpenGL context."""
@@ -165,7 +175,7 @@ def render_frame(
         pressed: (88,) bool, keys to show as pressed.
         width: of the picture [pixels].
         height: of the picture [pixels].
-        camera: one of `pianomime.world.scene_look.CAMERAS`.
+        camera: one of `pianomime.camera_names.CAMERAS`.
 
     Returns:
         (height, width, 3) uint8.
@@ -174,10 +184,8 @@ def render_frame(
         RenderUnavailable: there is no working OpenGL.
         ValueError: there is no such camera, or the size is not positive.
     """
-    with Painter(*_oversize((width, height), _PICTURE_OVERSIZE), camera) as painter:
-        large = _video_frame(painter.paint(qpos, key_colours(pressed)))
-    small = large.reformat(width, height, "rgb24", interpolation=_SHRINKING)
-    return np.asarray(small.to_ndarray(), np.uint8)
+    with Painter(width, height, camera, smooth=True) as painter:
+        return painter.paint(qpos, key_colours(pressed))
 
 
 def write_video(
@@ -238,10 +246,6 @@ def write_video(
 def _oversize(size: tuple[int, int], factor: float) -> tuple[int, int]:
     width, height = size
     return round(factor * width), round(factor * height)
-
-
-def _video_frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
-    return av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
 
 
 def _dressed_model(width: int, height: int) -> mujoco.MjModel:

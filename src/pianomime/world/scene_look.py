@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from pianomime.camera_names import CameraName
 from pianomime.keyboard import BLACK, KEYS
 from pianomime.palette import DARK, rgb
 from pianomime.world.parameters import key_centres
@@ -35,13 +36,11 @@ class View:
 
 
 # A narrow view from afar keeps the outer keys from fanning out.
-CAMERA_VIEWS = {
+CAMERA_VIEWS: dict[CameraName, View] = {
     "player": View((1.22, 0.0, 1.50), (0.075, 0.0, 0.0), 17.5),
     "top": View((0.10, 0.0, 2.20), (0.0999, 0.0, 0.0), 16.0),
     "side": View((0.62, 0.80, 0.42), (0.09, 0.06, 0.02), 34.0),
 }
-"""Cameras: over the player's shoulders, from straight above, from the treble end."""
-CAMERAS = tuple(CAMERA_VIEWS)
 LIGHT_VIEW = View((0.8, -1.15, 2.4), (0.08, -0.07, 0.0))
 """The light that casts shadows."""
 

@@ -157,7 +157,7 @@ def test_files_and_chunks_are_begun_where_one_is_full(
 ) -> None:
     pq = pytest.importorskip("pyarrow.parquet", reason="the extra data is not installed")
     monkeypatch.setattr("pianomime.learn.export.lerobot._FILE_MIB", 1e-6)
-    monkeypatch.setattr("pianomime.learn.export.lerobot.FILES_IN_CHUNK", 2)
+    monkeypatch.setattr("pianomime.learn.export.numbered_files.FILES_IN_CHUNK", 2)
     export_data(data, tmp_path / "out", "lerobot")
     for kind in ("data", "meta/episodes"):
         files = sorted((tmp_path / "out" / kind).rglob("*.parquet"))

@@ -9,11 +9,13 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from pianomime.errors import InputError
 from pianomime.files import new_folder
 from pianomime.sealed_json import read_json
 
 if TYPE_CHECKING:
     from pianomime.learn.data.trajectories import TrajectoryData
+    from pianomime.world.render import View
 
 DataFormat = Literal["lerobot", "minari"]
 """The formats of exports, by the library that reads each."""
@@ -38,25 +40,36 @@ def is_data_export(path: Path) -> bool:
     return isinstance(mark, dict) and mark.get("format") == FORMAT
 
 
-def export_data(data: TrajectoryData, path: Path, data_format: DataFormat) -> None:
+def export_data(
+    data: TrajectoryData, path: Path, data_format: DataFormat, view: View | None = None
+) -> None:
     """Write a data set for another library, all or nothing; an older export is replaced.
 
     Args:
         data: the data set.
         path: of the folder; those that it is in are made.
         data_format: of the export.
+        view: which camera takes a picture of every frame, and of which size; None for no pictures,
+            which Minari never has.
 
     Raises:
         InputError: there is something else at the place, its name is not one that Minari allows,
-            another process writes there, or the data set is damaged.
+            there is no such picture, another process writes there, or the data set is damaged.
         OSError: it cannot be written.
+        RenderUnavailable: there are to be pictures, and there is no working OpenGL.
         ModuleNotFoundError: a package of `PACKAGES` is not installed.
     """
     world = data.episodes[0]["world"]
     if data_format == "minari":
         from pianomime.learn.export.minari import check_minari_name
 
+        if view is not None:
+            raise InputError("pictures of a camera are written for lerobot alone, not for minari")
         check_minari_name(path)
+    elif view is not None:
+        from pianomime.learn.export.camera import check_view
+
+        check_view(view)
     path.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(path, is_data_export, "an export of a data set") as folder:
         folder.mkdir()
@@ -64,7 +77,7 @@ def export_data(data: TrajectoryData, path: Path, data_format: DataFormat) -> No
             from pianomime.learn.export.lerobot import feature_names, write_lerobot
 
             numbers = feature_names(world)
-            write_lerobot(data, folder)
+            write_lerobot(data, folder, view)
         else:
             from pianomime.learn.export.minari import write_minari
             from pianomime.learn.export.named_rows import names

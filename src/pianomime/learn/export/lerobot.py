@@ -2,12 +2,13 @@
 
 The data are Parquet files with one row a frame and one row group an episode; `meta/` says where
 each episode is, what the numbers are, and their statistics, by which policies normalize them. There
-are no pictures. The features:
+are pictures where a camera is wanted: H.264 in `videos/`. The features:
 
 - `observation.state`: joint positions, joint velocities, and how far each key is down;
 - `observation.environment_state`: what is to be played, in this frame and those that follow: the
   keys that are wanted, then the fingertips of the plan;
-- `action`: the controls of the expert.
+- `action`: the controls of the expert;
+- `observation.images.<camera>`: the picture of the state.
 """
 
 from __future__ import annotations
@@ -24,20 +25,20 @@ from numpy.typing import NDArray
 
 from pianomime.keyboard import FRAME_RATE
 from pianomime.learn.data.trajectories import TrajectoryData
+from pianomime.learn.export.camera import VIDEO, VIDEO_MIB, Camera, open_camera
 from pianomime.learn.export.feature_stats import QUANTILES, RunningStats, episode_stats
 from pianomime.learn.export.named_rows import COLUMNS_READ, names, rows
+from pianomime.learn.export.numbered_files import FILES_IN_CHUNK
+from pianomime.learn.export.parquet_files import ParquetFiles
 from pianomime.progress import Steps
+from pianomime.world.render import View
 
 VERSION = "v3.0"
 """Of the format."""
 ROBOT = "two_shadow_hands_at_a_piano"
 """The type of robot."""
-FILES_IN_CHUNK = 1000
-"""Files in a folder, as LeRobot has them by default."""
 _FILE_MIB = 100
 """[MiB] of a file of data at most, as LeRobot has it by default; one episode may be larger."""
-_VIDEO_MIB = 200
-"""[MiB] of a file of video at most, LeRobot's default: it must be said, though there are none."""
 _DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _EPISODES = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _ARRAYS = {
@@ -64,7 +65,7 @@ def feature_names(world: str) -> dict[str, tuple[str, ...]]:
     }
 
 
-def write_lerobot(data: TrajectoryData, folder: Path) -> None:
+def write_lerobot(data: TrajectoryData, folder: Path, view: View | None = None) -> None:
     """Write a data set as a LeRobotDataset v3.0.
 
     Episodes are in the order of their splits, those for training first, so that each split is a
@@ -73,10 +74,12 @@ def write_lerobot(data: TrajectoryData, folder: Path) -> None:
     Args:
         data: the data set.
         folder: where to write; it exists and is empty.
+        view: the camera, and the size of its pictures; None for an export without pictures.
 
     Raises:
         InputError: the data set is damaged.
         OSError: it cannot be written.
+        RenderUnavailable: there are to be pictures, and there is no working OpenGL.
     """
     facts = data.episodes
     order = sorted(
@@ -87,17 +90,26 @@ def write_lerobot(data: TrajectoryData, folder: Path) -> None:
         tasks.setdefault(facts[at]["name"], len(tasks))
     named = feature_names(facts[0]["world"])
     running = RunningStats(int(data.ends[-1]))
-    steps = Steps("exporting", len(order))
+    steps = Steps("exporting", int(data.ends[-1]))
     first_row = 0
     with ExitStack() as stack:
-        frames_out = stack.enter_context(_Files(folder, _DATA, _data_schema(named)))
-        episodes_out = stack.enter_context(_Files(folder, _EPISODES, _episodes_schema(named)))
+        camera = None if view is None else stack.enter_context(open_camera(folder, view))
+        frames_out = stack.enter_context(
+            ParquetFiles(folder, _DATA, _FILE_MIB, _data_schema(named))
+        )
+        episodes_out = stack.enter_context(
+            ParquetFiles(folder, _EPISODES, _FILE_MIB, _episodes_schema(named, camera))
+        )
         for index, at in enumerate(order):
-            features = _features(
-                data.columns(at, COLUMNS_READ), index, first_row, tasks[facts[at]["name"]]
-            )
+            columns = data.columns(at, COLUMNS_READ)
+            features = _features(columns, index, first_row, tasks[facts[at]["name"]])
             stats = {name: episode_stats(values) for name, values in features.items()}
             running.add(features, stats)
+            of_video: dict[str, Any] = {}
+            if camera is None:
+                steps.advance(len(features["index"]))
+            else:
+                of_video, stats[camera.feature] = camera.record(columns, steps.advance)
             count = len(features["index"])
             chunk, file = frames_out.write(_data_table(features, frames_out.schema))
             row = {
@@ -108,18 +120,18 @@ def write_lerobot(data: TrajectoryData, folder: Path) -> None:
                 "data/file_index": file,
                 "dataset_from_index": first_row,
                 "dataset_to_index": first_row + count,
+                **of_video,
                 "split": facts[at]["split"],
                 "song_id": facts[at]["song_id"],
                 "f1": facts[at]["f1"],
                 **{
-                    f"stats/{name}/{stat}": stats[name][stat].tolist()
-                    for name in features
+                    f"stats/{name}/{stat}": of_feature[stat].tolist()
+                    for name, of_feature in stats.items()
                     for stat in _STATS
                 },
             }
             episodes_out.write_row(row)
             first_row += count
-            steps.advance(1)
     splits = [facts[at]["split"] for at in order]
     info = {
         "codebase_version": VERSION,
@@ -129,77 +141,25 @@ def write_lerobot(data: TrajectoryData, folder: Path) -> None:
         "total_tasks": len(tasks),
         "chunks_size": FILES_IN_CHUNK,
         "data_files_size_in_mb": _FILE_MIB,
-        "video_files_size_in_mb": _VIDEO_MIB,
+        "video_files_size_in_mb": VIDEO_MIB,
         "fps": int(FRAME_RATE),
         "splits": {
             split: f"{splits.index(split)}:{splits.index(split) + splits.count(split)}"
             for split in dict.fromkeys(splits)
         },
         "data_path": _DATA,
-        "video_path": None,
-        "features": _described(named),
+        "video_path": None if camera is None else VIDEO,
+        "features": _described(named, camera),
     }
     _write_json(folder / "meta" / "info.json", info)
+    of_all = running.of_all()
+    if camera is not None:
+        of_all[camera.feature] = camera.stats()
     stats_of_all = {
-        name: {stat: stats[stat].tolist() for stat in _STATS}
-        for name, stats in running.of_all().items()
+        name: {stat: stats[stat].tolist() for stat in _STATS} for name, stats in of_all.items()
     }
     _write_json(folder / "meta" / "stats.json", stats_of_all)
     pq.write_table(_tasks_table(tasks), folder / "meta" / "tasks.parquet")
-
-
-class _Files:
-    """Parquet files that are filled one after the other, each up to LeRobot's size of a file."""
-
-    def __init__(self, folder: Path, pattern: str, schema: pa.Schema) -> None:
-        self.schema = schema
-        self._folder, self._pattern = folder, pattern
-        self._number, self._rows = -1, 0
-        self._sink: Any = None
-        self._writer: Any = None
-
-    def __enter__(self) -> _Files:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._close()
-
-    def write(self, table: pa.Table) -> tuple[int, int]:
-        """Write rows as one row group; returns the indices of their chunk and file."""
-        place = self._place(len(table))
-        self._writer.write_table(table)
-        self._rows += len(table)
-        return place
-
-    def write_row(self, row: dict[str, Any]) -> None:
-        """Write one row about an episode, with the place where it is."""
-        chunk, file = self._place(1)
-        row = {**row, "meta/episodes/chunk_index": chunk, "meta/episodes/file_index": file}
-        self._writer.write_table(pa.Table.from_pylist([row], self.schema))
-        self._rows += 1
-
-    def _place(self, count: int) -> tuple[int, int]:
-        """Chunk and file that the next rows go to; a new file is begun where one is full."""
-        # As LeRobot does it: by the size on disk of the rows that are there.
-        full = self._writer is None
-        if not full:
-            size = self._sink.tell()
-            full = size + size / self._rows * count >= _FILE_MIB * 1024**2
-        if full:
-            self._close()
-            self._number, self._rows = self._number + 1, 0
-        chunk, file = divmod(self._number, FILES_IN_CHUNK)
-        if full:
-            path = self._folder / self._pattern.format(chunk_index=chunk, file_index=file)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._sink = pa.OSFile(str(path), "wb")
-            self._writer = pq.ParquetWriter(self._sink, self.schema, compression="snappy")
-        return chunk, file
-
-    def _close(self) -> None:
-        if self._writer is not None:
-            self._writer.close()
-            self._sink.close()
 
 
 def _features(
@@ -237,8 +197,19 @@ def _data_table(features: dict[str, NDArray[Any]], schema: pa.Schema) -> pa.Tabl
     return pa.Table.from_arrays(columns, schema=schema)
 
 
-def _episodes_schema(named: dict[str, tuple[str, ...]]) -> pa.Schema:
-    whole = pa.int64()
+def _episodes_schema(named: dict[str, tuple[str, ...]], camera: Camera | None) -> pa.Schema:
+    whole, number = pa.int64(), pa.float64()
+    of_feature = dict.fromkeys((*named, "timestamp", *_INDICES), pa.list_(number))
+    of_video = []
+    if camera is not None:
+        # (3, 1, 1), which broadcasts over the pixels of a picture.
+        of_feature[camera.feature] = pa.list_(pa.list_(pa.list_(number)))
+        of_video = [
+            (f"videos/{camera.feature}/chunk_index", whole),
+            (f"videos/{camera.feature}/file_index", whole),
+            (f"videos/{camera.feature}/from_timestamp", number),
+            (f"videos/{camera.feature}/to_timestamp", number),
+        ]
     return pa.schema(
         [
             ("episode_index", whole),
@@ -248,13 +219,14 @@ def _episodes_schema(named: dict[str, tuple[str, ...]]) -> pa.Schema:
             ("data/file_index", whole),
             ("dataset_from_index", whole),
             ("dataset_to_index", whole),
+            *of_video,
             # What LeRobot does not ask for, and episodes are chosen by.
             ("split", pa.string()),
             ("song_id", whole),
-            ("f1", pa.float64()),
+            ("f1", number),
             *(
-                (f"stats/{name}/{stat}", pa.list_(whole if stat == "count" else pa.float64()))
-                for name in (*named, "timestamp", *_INDICES)
+                (f"stats/{name}/{stat}", pa.list_(whole) if stat == "count" else numbers)
+                for name, numbers in of_feature.items()
                 for stat in _STATS
             ),
             ("meta/episodes/chunk_index", whole),
@@ -263,7 +235,9 @@ def _episodes_schema(named: dict[str, tuple[str, ...]]) -> pa.Schema:
     )
 
 
-def _described(named: dict[str, tuple[str, ...]]) -> dict[str, dict[str, Any]]:
+def _described(
+    named: dict[str, tuple[str, ...]], camera: Camera | None
+) -> dict[str, dict[str, Any]]:
     """The features as `info.json` has them."""
     vectors = {
         feature: {"dtype": "float32", "shape": [len(each)], "names": list(each)}
@@ -271,7 +245,8 @@ def _described(named: dict[str, tuple[str, ...]]) -> dict[str, dict[str, Any]]:
     }
     one = {"shape": [1], "names": None}
     indices = {name: {"dtype": "int64", **one} for name in _INDICES}
-    return {**vectors, "timestamp": {"dtype": "float32", **one}, **indices}
+    pictures = {} if camera is None else {camera.feature: camera.described()}
+    return {**vectors, **pictures, "timestamp": {"dtype": "float32", **one}, **indices}
 
 
 def _tasks_table(tasks: dict[str, int]) -> pa.Table:
