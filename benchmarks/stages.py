@@ -25,7 +25,6 @@ from pianomime import Score, excerpt, load_player
 from pianomime.plan import FingertipPlan
 from pianomime.plan.hand_path import hand_paths, make_feasible
 from pianomime.players.builtin import ZERO_SHOT_20HZ
-from pianomime.players.generalist import PredictionConfig
 from pianomime.players.player import PlannedPlayer, Player
 from pianomime.policies.methods import SAMPLERS, THREE_STAGE, load_stages, policy_path
 from pianomime.policies.network_file import load_policy
@@ -69,9 +68,7 @@ class PredictedPlanner:
     def plan(self, score: Score) -> FingertipPlan:
         """As `Planner.plan`; where the robot's hands can be."""
         policy = load_policy(policy_path("high-diff"), SAMPLERS[0])
-        return make_feasible(
-            predicted_plan(score, policy, candidates=PredictionConfig().candidates)
-        )
+        return make_feasible(predicted_plan(score, policy))
 
 
 TWO_STAGE = "two-stage-diff"

@@ -12,7 +12,7 @@ from pianomime.players.generalist import GeneralistPlayer, PredictionConfig
 from pianomime.policies.features import action_reference, relative_to_wrist, to_world_frame
 from pianomime.policies.methods import METHODS, WEIGHTS
 from pianomime.policies.policy_tracker import PolicyTracker
-from pianomime.policies.predicted_plan import predicted_plan
+from pianomime.policies.predicted_plan import misfit, predicted_plan
 from pianomime.world import World
 from pianomime.world.parameters import key_centres
 
@@ -167,7 +167,31 @@ def test_candidates_that_are_alike_change_nothing():
     np.testing.assert_array_equal(alone.finger_key, four.finger_key)
 
 
-@pytest.mark.parametrize("number", [0, 1.5, 257])
+def test_what_does_not_fit_is_counted_in_keys():
+    points = np.zeros((2, 6, 3))
+    keys, goal = np.full((2, 5), -1, np.int8), np.zeros(88, bool)
+    goal[[40, 44]] = True
+    assert misfit(points, keys, goal) == 2, "two keys without a finger"
+    keys[1, [1, 3]] = 40, 44
+    points[1, [2, 4], 1] = key_centres()[[40, 44], 1] + 0.1
+    assert misfit(points, keys, goal) == 0, "a hand that is beside them as it is"
+    points[1, 4, 1] += 0.02
+    assert misfit(points, keys, goal) == pytest.approx(2 * (0.01 - 0.005) / 0.01), "drawn apart"
+
+
+def test_players_choose_among_as_many_candidates_as_they_are_told():
+    def pressed(number):
+        high = Wandering("high")
+        tracker = PolicyTracker(Still("low"))
+        config = PredictionConfig(candidates=number)
+        player = GeneralistPlayer("made up", tracker, high, prediction=config)
+        player.start(SCORE)
+        return {len(observation["vector"]) for observation in high.observations}
+
+    assert [pressed(number) for number in (1, 3)] == [{1}, {3}]
+
+
+@pytest.mark.parametrize("number", [0, 1.5, 17])
 def test_candidates_out_of_range_are_refused(number):
     with pytest.raises(InputError, match=r"planner\.candidates"):
         PredictionConfig(candidates=number)

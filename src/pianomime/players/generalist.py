@@ -11,15 +11,15 @@ from pianomime.policies.finger_assignment import flat_plan
 from pianomime.policies.generalist import OneStageController, TwoStageController
 from pianomime.policies.policy import Policy
 from pianomime.policies.policy_tracker import PolicyController, PolicyTracker
-from pianomime.policies.predicted_plan import predicted_plan
+from pianomime.policies.predicted_plan import CANDIDATES, predicted_plan
 from pianomime.policies.three_stage.controller import Stages, ThreeStageController
 from pianomime.short_repr import short_repr
 from pianomime.track import Controller
 from pianomime.validation import whole_numbers, within
 from pianomime.world_names import PAPER
 
-MOST_CANDIDATES = 256
-"""All are in memory."""
+MOST_CANDIDATES = 16
+"""Each takes 21 MB of memory for an hour of music."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class PredictionConfig:
     feasible: bool = True
     """Predict the whole song, and move fingertips to where the robot's hands can be, see
     `make_feasible`; otherwise they are predicted while it is played, and followed as they are."""
-    candidates: int = 4
+    candidates: int = CANDIDATES
     """Predictions of the whole song that are made side by side, of which those whose hands fit
-    their keys best go on."""
+    their keys best go on; of no effect where they are not made feasible."""
 
     def __post_init__(self) -> None:
         whole_numbers(self, "planner")

@@ -23,17 +23,17 @@ from pianomime.validation import within
 from pianomime.world.layout import POINT_COUNT
 from pianomime.world.parameters import key_centres
 
+CANDIDATES = 4
+"""Predictions that are made side by side."""
 _SELECT_FRAMES = 2
 """Frames between selections among candidates."""
 _SPAN_FREE, _SPAN_UNIT = 0.005, 0.01
 """[m] How far a hand's fingers may be from where they were predicted, relative to each other and
 along the keyboard, at no cost; and how much more costs as much as a key without a finger."""
-_LEAP_FREE, _LEAP_UNIT = 0.02, 0.04
-"""[m] The same for how far a wrist moves along the keyboard in a frame."""
 
 
 def predicted_plan(
-    score: Score, policy: Policy, seed: int = 0, candidates: int = 1
+    score: Score, policy: Policy, seed: int = 0, candidates: int = CANDIDATES
 ) -> FingertipPlan:
     """Predict the fingertips of a song, each frame from the prediction for the frame before.
 
@@ -41,7 +41,7 @@ def predicted_plan(
         score: what is to be played.
         policy: the fingertip policy.
         seed: of its sampling.
-        candidates: predictions that are made side by side; the best is taken.
+        candidates: how many, of which the best is taken.
 
     Returns:
         A plan with one row for each frame of `score.roll()`, see `assign_fingers`.
@@ -57,45 +57,36 @@ def predicted_plan(
     all_keys = np.empty((frames, *pressing.shape), np.int8)
     # Which candidate of the frame before each goes on from.
     parents = np.tile(np.arange(candidates), (frames, 1))
-    misfit = np.zeros(candidates)
+    misfits = np.zeros(candidates)
     told = Steps("fingertips", frames)
     for frame in range(frames):
         if candidates > 1 and frame % _SELECT_FRAMES == 0:
-            order = np.argsort(misfit, kind="stable")
+            order = np.argsort(misfits, kind="stable")
             chosen = np.resize(order[: -(-candidates // 2)], candidates)
-            points, pressing, misfit = points[chosen], pressing[chosen], misfit[chosen]
+            points, pressing, misfits = points[chosen], pressing[chosen], misfits[chosen]
             parents[frame] = chosen
         predicted = predict_points(policy, goals[frame : frame + GOAL_HORIZON], points, rng)[:, 0]
         for each in range(candidates):
-            before = points[each]
             points[each], pressing[each] = assign_fingers(
                 predicted[each], goals[frame], pressing[each]
             )
-            misfit[each] += _misfit(
-                predicted[each], before, points[each], pressing[each], goals[frame]
-            )
+            misfits[each] += misfit(predicted[each], pressing[each], goals[frame])
         all_points[frame], all_keys[frame] = points, pressing
         told.advance(1)
-    record, best = PlanRecord(score), int(np.argmin(misfit))
+    record, best = PlanRecord(score), int(np.argmin(misfits))
     for frame in reversed(range(frames)):
         record.write(frame, all_points[frame, best], all_keys[frame, best])
         best = parents[frame, best]
     return record.plan()
 
 
-def _misfit(
-    predicted: NDArray[np.float64],
-    before: NDArray[np.float64],
-    points: NDArray[np.float64],
-    finger_key: NDArray[np.int8],
-    goal: NDArray[np.bool_],
+def misfit(
+    predicted: NDArray[np.float64], finger_key: NDArray[np.int8], goal: NDArray[np.bool_]
 ) -> float:
     """What is wrong with a candidate in a frame, in keys that no finger was given.
 
     Args:
         predicted: (2, 6, 3) as the policy predicts them [m].
-        before: (2, 6, 3) in the frame before [m].
-        points: (2, 6, 3) with fingers on their keys [m].
         finger_key: (2, 5) the key of each finger, -1 for none.
         goal: (88,) keys that should be down.
     """
@@ -105,5 +96,4 @@ def _misfit(
             away = key_centres()[finger_key[hand, presses], 1] - predicted[hand, 1:][presses, 1]
             spread = np.abs(away - away.mean())
             cost += float(np.maximum(spread - _SPAN_FREE, 0.0).sum()) / _SPAN_UNIT
-    leap = np.abs(points[:, 0, 1] - before[:, 0, 1])
-    return cost + float(np.maximum(leap - _LEAP_FREE, 0.0).sum()) / _LEAP_UNIT
+    return cost

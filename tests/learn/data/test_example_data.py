@@ -29,6 +29,13 @@ def test_they_are_ten_minutes_of_all_bundled_songs():
         assert "public domain" in card
 
 
+def test_what_a_learned_policy_plays_is_not_said_to_be_free(tmp_path):
+    out = tmp_path / "learned.zarr"
+    options = ["--player", "three-stage", "--seconds", "2", "--jobs", "1"]
+    cli.main(["perform", "c-major-study", "-o", str(out), *options])
+    assert "license: unknown" in (out / "README.md").read_text("utf-8")
+
+
 def test_policies_can_learn_from_them():
     data = trajectory_dataset([FOLDER / name for name in NAMES])
     assert len(data.name) == 2 * len(songs.names())

@@ -140,7 +140,7 @@ def test_one_hand_alone_is_heard_as_both_are(
     assert found.alone == beside * FRAMES
     before, before_alone = found.steps, found.alone
     # Where hands are together, little enough for neither to touch a key that the other one presses.
-    variations = ctrl + (1.0 if apart else 0.3) * (varied(hand, 3, apart) - ctrl)
+    variations = ctrl + (1.0 if apart else 0.1) * (varied(hand, 3, apart) - ctrl)
     for one in (ctrl, *variations):
         both, mine = found.best(start, one[None]), found.best(alone, one[None])
         for whole, part in zip(both.heard, mine.heard, strict=True):

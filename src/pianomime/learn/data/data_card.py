@@ -28,6 +28,8 @@ _SIZES = (
 """Numbers of rows below which a card has one of the names that catalogues of data sets know."""
 _LARGEST = "100M<n<1B"
 
+_LEARNED_NOTHING = ("zero-shot", "zero-shot-ik", "zero-shot-20hz")
+"""Players."""
 _PUBLIC_DOMAIN = (
     "The songs are those that are bundled with PianoMime. They are in the public domain, and so",
     "is this data set (CC0 1.0).",
@@ -61,7 +63,11 @@ def data_card(path: Path) -> str:
         else ""
     )
     bundled = {hashlib.sha256(song_path(name).read_bytes()).hexdigest() for name in names()}
-    free = {row["source"]["digest"] for row in data.episodes} <= bundled
+    # What learned policies play may be bound to the data that they learned from.
+    free = all(
+        row["source"]["digest"] in bundled and row["source"]["player"] in _LEARNED_NOTHING
+        for row in data.episodes
+    )
     parts = ", ".join(f"{number} of the split {shown(name)}" for name, number in splits.items())
     front = [
         "---",
