@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter
 from pathlib import Path
 
 from pianomime import __version__
+from pianomime.files import files_digest
 from pianomime.keyboard import FRAME_RATE
 from pianomime.learn.data.episode import COLUMNS, EVENTS, Column
 from pianomime.learn.data.trajectories import TrajectoryData
@@ -28,8 +28,6 @@ _SIZES = (
 """Numbers of rows below which a card has one of the names that catalogues of data sets know."""
 _LARGEST = "100M<n<1B"
 
-_LEARNED_NOTHING = ("zero-shot", "zero-shot-ik", "zero-shot-20hz")
-"""Players."""
 _PUBLIC_DOMAIN = (
     "The songs are those that are bundled with PianoMime. They are in the public domain, and so",
     "is this data set (CC0 1.0).",
@@ -62,11 +60,10 @@ def data_card(path: Path) -> str:
         if settings["noise"]
         else ""
     )
-    bundled = {hashlib.sha256(song_path(name).read_bytes()).hexdigest() for name in names()}
-    # What learned policies play may be bound to the data that they learned from.
-    free = all(
-        row["source"]["digest"] in bundled and row["source"]["player"] in _LEARNED_NOTHING
-        for row in data.episodes
+    bundled = {files_digest([song_path(name)]) for name in names()}
+    # What learned policies play may be bound to the data that they learned from: no weights.
+    free = settings["player_files"] == files_digest([]) and all(
+        row["source"]["digest"] in bundled for row in data.episodes
     )
     parts = ", ".join(f"{number} of the split {shown(name)}" for name, number in splits.items())
     front = [

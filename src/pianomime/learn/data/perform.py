@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import time
@@ -334,7 +333,7 @@ def _digests(songs: list[Path], failed: list[dict[str, str]]) -> dict[Path, str]
     found: dict[str, Path] = {}
     for song in songs:
         try:
-            digest = hashlib.sha256(song.read_bytes()).hexdigest()
+            digest = files_digest([song])
         except OSError as error:
             failed.append(_failure(song, error.strerror or str(error)))
             continue

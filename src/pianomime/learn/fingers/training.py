@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 from collections.abc import Sequence
 from contextlib import closing
 from itertools import product
@@ -68,7 +67,7 @@ def train_fingers(
     """
     within("threads", threads, 0)
     # Each content once, by its digest: which are kept hardly depends on what else there is.
-    contents = {hashlib.sha256(path.read_bytes()).hexdigest(): path for path in find_songs(folders)}
+    contents = {files_digest([path]): path for path in find_songs(folders)}
     paths = [contents[digest] for digest in sorted(contents)]
     if len(paths) <= VALIDATION_SONGS:
         raise InputError(

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pianomime.errors import InputError
+from pianomime.files import files_digest
 from pianomime.keyboard import KEYS
 from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.sdf import QUERY_HIGH, QUERY_LOW
@@ -105,7 +106,7 @@ def read_goals(folders: Sequence[Path], validation_share: float, progress: Progr
                 # Notes outside the keyboard are left out, which is no loss here.
                 warnings.simplefilter("ignore")
                 goals = Goals.from_roll(Score.from_midi(path).roll())
-            found[hashlib.sha256(path.read_bytes()).hexdigest()] = goals
+            found[files_digest([path])] = goals
         except (InputError, OSError):
             skipped += 1
         progress("reading", done, len(paths), f"{skipped} unreadable" if skipped else "")
