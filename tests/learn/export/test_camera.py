@@ -60,11 +60,6 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def data(path: Path) -> TrajectoryData:
-    return TrajectoryData.open(path)
-
-
-@pytest.fixture(scope="module")
 def opengl() -> None:
     try:
         render_frame(np.zeros(142), np.zeros(88, bool), 16, 16)

@@ -45,11 +45,6 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
-def data(path: Path) -> TrajectoryData:
-    return TrajectoryData.open(path)
-
-
 @pytest.mark.parametrize("world", WORLDS)
 def test_numbers_have_names_of_their_own(world: str) -> None:
     named = names(world)
