@@ -41,6 +41,8 @@ class Train:
       pianomime train high-diff --experts dagger.zarr
       pianomime train low-diff --experts dagger.zarr
       pianomime train low-diff-res --experts A.zarr B.zarr --trainer.steps 50000
+      pianomime train low-diff --experts more.zarr --pretrained low-diff.onnx \
+        --trainer.learning-rate 3e-4 -o out/tuned
       pianomime train high-diff --size paper --demonstrations demos -o out/paper
     """
 
@@ -56,7 +58,11 @@ class Train:
     ] = ()
     """Data sets made by `pianomime collect-dagger` or `pianomime collect`."""
     goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")] = None
-    """Folder of the goal encoder; OUT/goal if not given."""
+    """Folder of the goal encoder; OUT/goal if not given, and that of the pretrained policy where
+    there is one."""
+    pretrained: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
+    """Policy (.onnx) of the same kind and size that is trained further, instead of random weights:
+    fine-tuning, for which a lower --trainer.learning-rate is usual."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/generalist")
     """Folder for the results, shared by all policies."""
     size: Size = "small"
@@ -104,6 +110,7 @@ class Train:
                 self.experts,
                 goal,
                 progress,
+                self.pretrained,
             )
         print(f"saved: {shown(file)}")
 
@@ -121,7 +128,12 @@ class Train:
         if self.demonstrations is not None:
             need_demonstrations(self.demonstrations)
         need_data_sets(self.experts)
-        if self.config.goal_encoding == "sdf":
+        if self.pretrained is not None and self.goal is not None:
+            raise InputError(
+                "--goal and --pretrained: name one of the two, for a policy's file holds its goal "
+                "encoder"
+            )
+        if self.pretrained is None and self.config.goal_encoding == "sdf":
             need_goal_encoder(goal, self.policy)
         need_folder(self.out)
 

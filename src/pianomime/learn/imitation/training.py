@@ -22,6 +22,7 @@ from pianomime.learn.data.dataset import (
 from pianomime.learn.imitation.config import PolicyConfig, check_sources
 from pianomime.learn.imitation.export import export_policy, policy_info, torch_policy
 from pianomime.learn.imitation.network import PolicyNetwork
+from pianomime.learn.imitation.pretrained import check_pretrained, load_pretrained
 from pianomime.learn.imitation.samples import Samples
 from pianomime.learn.runs.trainer import train_network
 from pianomime.policies.features import action_reference, to_world_frame
@@ -43,6 +44,7 @@ def train_policy(
     experts: Sequence[Path],
     goal: Path | None,
     progress: Progress = no_progress,
+    pretrained: Path | None = None,
 ) -> Path:
     """Train a policy, or resume its training.
 
@@ -52,8 +54,10 @@ def train_policy(
         out: folder; `NAME.onnx` is the result, and `NAME` holds the training.
         demonstrations: what high levels learn from, see `demonstration_dataset`; `experts` if None.
         experts: data sets that all others learn from, see `trajectory_dataset`.
-        goal: folder of the goal encoder, where goals are encoded.
+        goal: folder of the goal encoder, where goals are encoded and nothing is pretrained.
         progress: called as the data are read, and with the updates that were done.
+        pretrained: policy file whose weights are trained on, with its normalizers and its goal
+            encoder; random weights if None.
 
     Returns:
         The ONNX file.
@@ -63,13 +67,11 @@ def train_policy(
         OSError: a file cannot be read or written.
     """
     check_sources(name, config, demonstrations, experts)
+    before = None if pretrained is None else check_pretrained(config, pretrained)
     encoder = None
     if config.goal_encoding == "sdf":
-        if goal is None:
-            raise InputError(f"{name} needs a goal encoder (--goal): `pianomime train-goal`")
-        from pianomime.learn.goal.training import load_encoder
-
-        encoder = load_encoder(goal)
+        # That of a pretrained policy is in its file, as are its normalizers.
+        encoder = _goal_encoder(name, goal) if pretrained is None else _blank_encoder()
     progress("reading", 0, 0)
     dataset = _dataset(config, demonstrations, experts)
     if len(set(dataset.song_id.tolist())) < 2:
@@ -80,8 +82,12 @@ def train_policy(
     torch.manual_seed(seed)
     shapes = {key: value.shape[1:] for key, value in sample.items()}
     network = PolicyNetwork(config, shapes, encoder)
-    network.fit_normalizers(sample)
     settings = dataclasses.asdict(config)
+    if pretrained is None:
+        network.fit_normalizers(sample)
+    else:
+        load_pretrained(network, pretrained)
+        settings["pretrained"] = _digest(network)
     # The trainer adds its own.
     del settings["trainer"]
     digest = dataset.digest()
@@ -104,8 +110,31 @@ def train_policy(
     )
     progress("exporting", 0, 0)
     result = out / f"{name}.onnx"
-    export_policy(network, policy_info(network, name, digest), result)
+    info = policy_info(network, name, digest)
+    if before is not None:
+        info = dataclasses.replace(info, licence=before.licence)
+    export_policy(network, info, result)
     return result
+
+
+def _goal_encoder(name: str, goal: Path | None) -> torch.nn.Module:
+    """The goal encoder that a policy needs.
+
+    Raises:
+        InputError: there is none, or it is damaged or of another version.
+    """
+    if goal is None:
+        raise InputError(f"{name} needs a goal encoder (--goal): `pianomime train-goal`")
+    from pianomime.learn.goal.training import load_encoder
+
+    return load_encoder(goal)
+
+
+def _blank_encoder() -> torch.nn.Module:
+    """A goal encoder whose weights are still to be loaded; they are not trained."""
+    from pianomime.learn.goal.autoencoder import GoalEncoder
+
+    return GoalEncoder().requires_grad_(False)
 
 
 def _dataset(config: PolicyConfig, demonstrations: Path | None, experts: Sequence[Path]) -> Dataset:
