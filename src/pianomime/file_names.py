@@ -84,6 +84,20 @@ def check_name(path: PurePath) -> None:
         raise InputError(f"{path}: the name is longer than {_MOST_BYTES} bytes")
 
 
+def check_replaceable(path: PurePath) -> None:
+    """Refuse a place for a new folder that another path would have to name, such as ".".
+
+    Args:
+        path: of a folder that will be replaced as a whole.
+
+    Raises:
+        InputError: its last part is no name, or one that is too long.
+    """
+    if path.name in ("", ".."):
+        raise InputError(f"{path}: cannot be replaced as a whole: give the folder a name")
+    check_name(path)
+
+
 def _shortened(text: str, most: int) -> str:
     """The beginning of a text that has at most so many bytes, in whole characters."""
     return text.encode()[:most].decode(errors="ignore").rstrip(" .")

@@ -10,8 +10,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from pianomime.errors import InputError
-from pianomime.file_names import check_name
+from pianomime.file_names import check_name, check_replaceable
 from pianomime.staging import claim, hold
+from pianomime.stop import deferred
 
 _PATIENCE = 10.0
 """[s] for another writer of the same file to be done."""
@@ -102,36 +103,59 @@ def new_folder(path: Path, is_ours: Callable[[Path], bool], kind: str) -> Iterat
         kind: what is replaced, such as "a data set".
 
     Raises:
-        InputError: there is something else at the place, or another process writes there.
+        InputError: there is something else at the place, it has no name, or another process writes
+            there.
         OSError: it cannot be written.
     """
+    check_replaceable(path)
     with hold(path) as folder:
         # Not in the folder, which the next process sweeps: for a moment it is the only one.
-        older = path.with_name(_aside(path.name))
-        if older.exists():
-            _undo(older, path)
+        older = _aside(path)
+        _undo(older, path)
         if path.exists() and not is_ours(path):
             raise InputError(f"{path}: is something else than {kind}")
         fresh = Path(folder, path.name)
         yield fresh
-        if path.exists():
-            os.replace(path, older)
-        try:
-            os.replace(fresh, path)
-        except BaseException:
-            if older.exists():
+        # A signal waits: nobody shall find neither of the two.
+        with deferred():
+            if path.exists():
+                os.replace(path, older)
+            try:
+                os.replace(fresh, path)
+            except BaseException:
                 _undo(older, path)
-            raise
+                raise
         shutil.rmtree(older, ignore_errors=True)
 
 
-def _aside(name: str) -> str:
+def put_back(path: Path) -> None:
+    """Put back the folder that `new_folder` had set aside when its process was killed, if any.
+
+    For whoever reads what is at a place before replacing it.
+
+    Args:
+        path: where the folder was, which `check_replaceable` has let pass.
+
+    Raises:
+        InputError: another process writes there.
+        OSError: it cannot be moved.
+    """
+    older = _aside(path)
+    if older.exists():
+        with hold(path):
+            _undo(older, path)
+
+
+def _aside(path: Path) -> Path:
     """Where a folder is while another takes its place: a hash, for names may be long."""
-    return f".pianomime-older-{hashlib.sha256(os.fsencode(name)).hexdigest()[:16]}"
+    digest = hashlib.sha256(os.fsencode(path.name)).hexdigest()[:16]
+    return path.with_name(f".pianomime-older-{digest}")
 
 
 def _undo(older: Path, path: Path) -> None:
     """Put a folder back that was set aside; if the new one is in its place, it is not needed."""
+    if not older.exists():
+        return
     if path.exists():
         shutil.rmtree(older)
     else:

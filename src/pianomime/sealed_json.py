@@ -29,17 +29,21 @@ def parse_json(text: str | bytes) -> Any:
         raise InputError("it is not JSON") from error
 
 
-def read_json(path: str | os.PathLike[str]) -> Any:
+def read_json(path: str | os.PathLike[str], most_bytes: int = _MOST_BYTES) -> Any:
     """What a file of JSON says.
+
+    Args:
+        path: of the file.
+        most_bytes: that it may have.
 
     Raises:
         OSError: the file does not exist or cannot be read.
         InputError: as `parse_json`, or the file is too large.
     """
     with Path(path).open("rb") as file:
-        text = file.read(_MOST_BYTES + 1)
-    if len(text) > _MOST_BYTES:
-        raise InputError(f"it is larger than {_MOST_BYTES // 1024**2} MiB")
+        text = file.read(most_bytes + 1)
+    if len(text) > most_bytes:
+        raise InputError(f"it is larger than {most_bytes // 1024**2} MiB")
     return parse_json(text)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from pianomime.errors import InputError
 from pianomime.shown import shown
 
 if TYPE_CHECKING:
@@ -68,7 +70,6 @@ class Collect:
             need_packages,
             need_place_for_data_set,
         )
-        from pianomime.errors import InputError
 
         if not self.runs:
             raise InputError("no runs to collect: name run folders of experts")
@@ -99,5 +100,11 @@ class Collect:
             found = find_expert_runs(path)
             progress("playing", 0, len(found))
             for done, folder in enumerate(found, 1):
-                yield play_episode(ExpertRun.load(folder))
+                run = ExpertRun.load(folder)
+                try:
+                    episode = play_episode(run)
+                except InputError as error:
+                    warnings.warn(f"left out: {folder}: {error}", stacklevel=2)
+                else:
+                    yield episode
                 progress("playing", done, len(found))

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pianomime import cli
-from pianomime.errors import InputError
+from pianomime.errors import InputError, WorkFailed
+from pianomime.learn.data import dagger
 from pianomime.learn.data.dagger import (
     collect_dagger,
     collect_dagger_episode,
@@ -202,6 +203,32 @@ def test_a_rollout_policy_that_is_damaged_is_refused(two_notes, tmp_path):
     config = DaggerConfig(rollout_policy=tmp_path / "policy.onnx")
     with pytest.raises(InputError, match="damaged"):
         next(collect_dagger([two_notes], config))
+
+
+def test_where_physics_broke_is_left_out_with_a_word(two_notes, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(World, "blow_ups", property(lambda _: 2, lambda *_: None), raising=False)
+        with pytest.raises(InputError, match="the physics broke in 2 of "):
+            collect_dagger_episode(two_notes, 0, QUIET)
+
+    def work(worker, numbers, jobs, request):
+        answer = dagger.load_dagger_worker(None)
+        for number in numbers:
+            yield number, ({"error": "it broke"} if number in broken else answer(request(number)))
+
+    monkeypatch.setattr(dagger, "work", work)
+    named = [
+        replace(two_notes, score=replace(two_notes.score, title=title)) for title in ("a", "b", "c")
+    ]
+    broken = {1}
+    with pytest.warns(UserWarning, match="left out: b: cannot be recorded: it broke"):
+        assert [each.name for each in collect_dagger(named, QUIET)] == ["a", "c"]
+    broken = {0, 1, 2}
+    with (
+        pytest.warns(UserWarning, match="left out"),
+        pytest.raises(WorkFailed, match="c: cannot be recorded: it broke"),
+    ):
+        list(collect_dagger(named, QUIET))
 
 
 def test_a_plan_in_which_no_finger_presses_is_refused_unless_a_policy_makes_one(

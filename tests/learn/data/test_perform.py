@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import mido
 import numpy as np
 import pytest
 import zarr
@@ -146,8 +147,12 @@ def test_more_songs_are_added_and_a_copy_is_not(songs: Path, tmp_path: Path) -> 
     out = tmp_path / "songs.zarr"
     made([songs / "one.mid"], out)
     before = digests(out)
-    (songs / "copy.mid").write_bytes((songs / "one.mid").read_bytes())
-    done = made(songs, out)
+    for name in ("copy", "other"):
+        (songs / f"{name}.mid").write_bytes((songs / "one.mid").read_bytes())
+    with pytest.warns(UserWarning, match="one.mid and 1 more: the same content as another file"):
+        done = made(songs, out)
+    for name in ("copy", "other"):
+        (songs / f"{name}.mid").unlink()
     assert (done.added, done.episodes) == (1, 2)
     after = digests(out)
     assert {**after, **before} == after
@@ -236,6 +241,8 @@ def test_what_is_for_tests_is_never_trained_on(songs: Path, tmp_path: Path) -> N
         "slower": "is the same music as another song, of the split test",
     }
     assert trajectory_dataset([out]).name == ["two"]
+    # What is there, if as something else, is not missing.
+    assert [row["song"] for row in TrajectoryData.open(out).making.failed] == ["slower"]
 
 
 def test_with_noise_the_action_is_the_experts(songs: Path, tmp_path: Path) -> None:
@@ -386,22 +393,106 @@ def test_what_is_in_the_way_stays(songs: Path, tmp_path: Path) -> None:
 def test_one_that_physics_broke_in_is_a_failure(
     songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pianomime.learn.data import perform_worker
-
     setup = {
         **{"player": "zero-shot-20hz", "effort": 0, "seed": 0, "world": None, "settings": {}},
         **{"seconds": SECONDS, "lead_in": 0.0, "noise": 0.0},
     }
     answer = load_perform_worker(setup)
-    record = perform_worker.record
-    monkeypatch.setattr(
-        perform_worker, "record", lambda *given: record(*given)._replace(blow_ups=3)
-    )
+    monkeypatch.setattr(World, "blow_ups", property(lambda _: 3, lambda *_: None), raising=False)
     part = tmp_path / "part.npz"
     task = {"song": str(songs / "one.mid"), "digest": "00" * 32, "part": str(part)}
     with pytest.raises(InputError, match="the physics broke in 3 of "):
         answer({**task, "split": "train"})
     assert not part.exists()
+
+
+def test_what_is_left_out_of_a_song_is_told(songs: Path, tmp_path: Path) -> None:
+    midi = mido.MidiFile(songs / "one.mid")
+    track = midi.tracks[-1]
+    for kind in ("note_on", "note_off"):
+        track.insert(-1, mido.Message(kind, note=120, velocity=64, time=100))
+    midi.save(songs / "one.mid")
+    with pytest.warns(UserWarning, match=r"one\.mid: 1 of 4 notes are outside the range"):
+        assert made(songs, tmp_path / "songs.zarr").added == 2
+
+
+def test_a_damaged_part_of_a_song_that_is_not_named_is_left_out(
+    songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "songs.zarr"
+
+    def full(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(factory, "write_trajectories", full)
+        with pytest.raises(WorkFailed):
+            made(songs, out)
+    one, _ = parts_in(parts_folder(out))
+    one.write_bytes(one.read_bytes()[:-100])
+    with pytest.warns(UserWarning, match="left out: name its song again"):
+        assert made([songs / "two.mid"], out).added == 1
+    assert set(digests(out)) == {"two"}
+    assert made(songs, out).added == 1
+    assert set(digests(out)) == {"one", "two"}
+
+
+def test_a_damaged_data_set_costs_nothing_of_what_is_played(songs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "songs.zarr"
+    made([songs / "one.mid"], out)
+    chunk = next(each for each in (out / "joints" / "c").rglob("*") if each.is_file())
+    chunk.unlink()
+    with pytest.raises(InputError, match=r"damaged .*; all that was played is kept in"):
+        made(songs, out)
+    assert len(parts_in(parts_folder(out))) == 1
+
+
+def test_a_data_set_that_was_set_aside_by_a_killed_process_is_added_to(
+    songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "songs.zarr"
+    made([songs / "one.mid"], out)
+    replace = os.replace
+
+    class Killed(BaseException):
+        """What ends a process at once."""
+
+    def killed(source: Path, target: Path) -> None:
+        replace(source, target)
+        if Path(source) == out:
+            raise Killed
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pianomime.files.os.replace", killed)
+        with pytest.raises(Killed):
+            made(songs, out)
+    assert not out.exists()
+    assert made(songs, out).episodes == 2
+    assert set(digests(out)) == {"one", "two"}
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["songs", "songs.zarr"]
+
+
+@pytest.mark.parametrize("place", [".", "..", "/"])
+def test_a_place_without_a_name_is_refused(
+    songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    made([songs / "one.mid"], tmp_path / "songs.zarr")
+    monkeypatch.chdir(tmp_path / "songs.zarr")
+    with pytest.raises(InputError, match="give the folder a name"):
+        made(songs, Path(place))
+    assert len(TrajectoryData.open(tmp_path / "songs.zarr")) == 1
+
+
+def test_a_full_disk_at_the_very_start_leaves_nothing(
+    songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pianomime.learn.data.parts.sealed", full)
+    with pytest.raises(OSError, match="No space left"):
+        made(songs, tmp_path / "songs.zarr")
+    assert [each.name for each in tmp_path.iterdir()] == ["songs"]
 
 
 def test_a_data_set_of_other_origin_is_not_added_to(songs: Path, tmp_path: Path) -> None:

@@ -412,6 +412,18 @@ def test_killed_while_one_replaces_another(
     assert [each.name for each in tmp_path.iterdir()] == [out.name]
 
 
+def test_more_episodes_than_a_data_set_can_list(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    columns = {name: np.ones((4, *column.shape), column.dtype) for name, column in COLUMNS.items()}
+    monkeypatch.setattr("pianomime.learn.data.trajectories.MOST_BYTES", 2000)
+    with pytest.raises(InputError, match="2 episodes are too many"):
+        write_trajectories(
+            tmp_path / "many.zarr", iter([Episode(name, 0.0, "ik", columns) for name in "ab"])
+        )
+    assert not (tmp_path / "many.zarr").exists()
+
+
 @pytest.mark.parametrize("name", ["qpos_1e4", "qvel_500", "ctrl_1e4"])
 @pytest.mark.parametrize("value", [1e20, 1e300, -1e20])
 def test_published_numbers_out_of_range(tmp_path: Path, name: str, value: float) -> None:

@@ -66,7 +66,7 @@ def collect_dagger_episode(
         config: which policies play, and the noise.
 
     Raises:
-        InputError: a policy cannot be read.
+        InputError: a policy cannot be read, or the physics broke.
     """
     rng = np.random.default_rng([config.seed, number])
     spread = noise_spread(config.noise * rng.random())
@@ -83,7 +83,7 @@ def collect_dagger_episode(
         played = PolicyController(plan, tracker, score.roll())
     expert = DynamicTracker().start(feasible)
     controller = NoisyController(expert, played, spread, config.noise_correlation, rng)
-    columns, qpos, events, _ = record(controller, score)
+    columns, qpos, events = record(controller, score)
     columns["action"][:] = controller.labels
     base = base_controls(IkTracker().start(plan), qpos)
     f1 = fill_columns(columns, base, score.roll(), plan.fingertips, plan.finger_key)
@@ -133,6 +133,7 @@ def collect_dagger(
 ) -> Generator[Episode, None, None]:
     """Episodes of many demonstrations, in their order, several at a time.
 
+    One that cannot be played, as where the physics breaks, is left out, which a warning tells.
     Closing the generator ends the processes, also in the middle of work.
 
     Args:
@@ -143,7 +144,7 @@ def collect_dagger(
     Raises:
         InputError: a policy cannot be used, or no finger presses a key in a demonstration and no
             policy says where fingers go.
-        WorkFailed: a demonstration cannot be played.
+        WorkFailed: no demonstration can be played.
     """
     check_policies(config)
     if config.fingertip_policy is None:
@@ -160,21 +161,26 @@ def collect_dagger(
             Path(names["task"]).write_bytes(pickle.dumps(task))
             return names
 
-        done: set[int] = set()
+        # Whether each could be played.
+        done: dict[int, bool] = {}
         turn = 0
         numbers = range(len(demonstrations))
         with closing(work(_WORKER, numbers, jobs or cores(), request=request)) as recorded:
             for number, row in recorded:
-                if "error" in row:
+                done[number] = "error" not in row
+                if not done[number]:
                     title = demonstrations[number].score.title
-                    raise WorkFailed(f"{title}: cannot be recorded: {row['error']}")
-                done.add(number)
+                    told = f"{title}: cannot be recorded: {row['error']}"
+                    if len(done) == len(demonstrations) and not any(done.values()):
+                        raise WorkFailed(told)
+                    warnings.warn(f"left out: {told}", stacklevel=2)
                 while turn in done:
-                    path = Path(folder, f"{turn}.episode")
-                    episode: Episode = pickle.loads(path.read_bytes())
-                    path.unlink()
+                    if done[turn]:
+                        path = Path(folder, f"{turn}.episode")
+                        episode: Episode = pickle.loads(path.read_bytes())
+                        path.unlink()
+                        yield episode
                     turn += 1
-                    yield episode
 
 
 def load_dagger_worker(setup: None) -> Answer:

@@ -144,20 +144,18 @@ class Recording(NamedTuple):
         columns: of T frames; those that `fill_columns` fills are not filled yet.
         qpos: (T, 142) positions before each frame, as in `World.qpos` [rad, m].
         events: arrays by the names in `EVENTS`.
-        blow_ups: number of frames in which the physics broke.
     """
 
     columns: dict[str, NDArray[Any]]
     qpos: NDArray[np.float64]
     events: dict[str, NDArray[Any]]
-    blow_ups: int
 
 
 def play_episode(run: ExpertRun) -> Episode:
     """Have the best expert of a run play its song.
 
     Raises:
-        InputError: nothing was trained in the run.
+        InputError: nothing was trained in the run, or the physics broke.
     """
     # Late: other episodes need nothing of experts.
     from pianomime.learn.envs.batch import base_controller
@@ -168,7 +166,7 @@ def play_episode(run: ExpertRun) -> Episode:
         expert_tracker(run).start(demonstration.plan),
         base_controller(env, demonstration.plan),
     )
-    columns, qpos, events, _ = record(controller, demonstration.score, env.world)
+    columns, qpos, events = record(controller, demonstration.score, env.world)
     f1 = fill_columns(
         columns,
         base_controls(base, qpos),
@@ -200,7 +198,8 @@ def record(
         touch: name of the map from the speed of a key to MIDI velocity.
 
     Raises:
-        InputError: the controller gives several controls a frame, which is no action of a frame.
+        InputError: the controller gives several controls a frame, which is no action of a frame;
+            or the physics broke, after which states do not follow from actions.
     """
     pedal, world = score.pedal_roll(), World(world_name, quiet=True)
     columns, events = empty_columns(len(pedal)), NOTHING
@@ -225,7 +224,9 @@ def record(
         events = events.followed_by(step.key_events.later(step.frame * FRAME_SECONDS))
         if step.frame + 1 < len(pedal):
             observe(step.frame + 1)
-    return Recording(columns, qpos, event_columns(events, touch), world.blow_ups)
+    if world.blow_ups:
+        raise InputError(f"the physics broke in {world.blow_ups} of {len(pedal)} frames")
+    return Recording(columns, qpos, event_columns(events, touch))
 
 
 def base_controls(base: BatchController, qpos: NDArray[np.float64]) -> NDArray[np.float64]:

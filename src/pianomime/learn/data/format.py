@@ -7,9 +7,13 @@ from typing import Any
 
 from pianomime.sealed_json import read_json
 
+ATTRIBUTES = "zarr.json"
+"""File of the attributes, in the folder of the data set."""
 FORMAT = "pianomime experts"
 VERSION = 5
 """Of the data set; version 4 had no events."""
+MOST_BYTES = 1024**3
+"""Bytes of the attributes at most: those of half a million episodes."""
 
 
 def is_data_set(path: Path) -> bool:
@@ -32,7 +36,7 @@ def training_songs(path: Path) -> dict[int | str, str]:
 def zarr_attributes(path: Path) -> dict[str, Any] | None:
     """The attributes of a zarr 3 group; None if a folder is none."""
     try:
-        attributes = read_json(path / "zarr.json")["attributes"]
+        attributes = read_json(path / ATTRIBUTES, MOST_BYTES)["attributes"]
     except (OSError, ValueError, LookupError, TypeError):
         return None
     return attributes if isinstance(attributes, dict) else None

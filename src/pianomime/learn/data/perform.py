@@ -7,15 +7,16 @@ import math
 import time
 import warnings
 from collections.abc import Generator, Iterable, Iterator, Mapping
-from contextlib import ExitStack, closing
-from dataclasses import asdict, dataclass
+from contextlib import ExitStack, closing, suppress
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pianomime.errors import InputError, WorkFailed
-from pianomime.files import files_digest
+from pianomime.file_names import check_replaceable
+from pianomime.files import files_digest, put_back
 from pianomime.keyboard import EXCERPT_SECONDS, FRAME_RATE
 from pianomime.learn.data.data_card import data_card
 from pianomime.learn.data.episode import Episode, Source
@@ -58,7 +59,8 @@ class Performed:
         episodes: number of episodes that it holds now.
         hours: of playing that it holds [h].
         f1: mean of its episodes.
-        failed: `song` and `error` of each song that could not be played.
+        failed: `song` and `error` of each song that could not be played, or belongs to another
+            split already.
     """
 
     added: int
@@ -93,7 +95,7 @@ def perform(
 
     Args:
         paths: MIDI files, folders of them, or names of bundled songs. Files with the same content
-            are played once.
+            are played once, which a warning tells, as others do what of a song is not played.
         out: the data set, a folder.
         player: whatever `load_player` takes, but for a `Player`; it plans, and gives one control a
             frame.
@@ -119,6 +121,7 @@ def perform(
             finished are kept, and the same call goes on.
         OSError: `out` cannot be written.
     """
+    check_replaceable(out)
     songs = find_songs(paths)
     setup = {
         "player": str(player),
@@ -140,41 +143,44 @@ def perform(
     folder = parts_folder(out)
     with ExitStack() as stack:
         stack.enter_context(hold(folder))
+        put_back(out)
         older = TrajectoryData.open(out) if out.exists() else None
         if older is not None:
             if not older.making.settings:
                 raise InputError(f"{out}: was not made by `perform`; name another place")
             check_settings(out, older.making.settings, made_by)
-        open_parts(folder, made_by)
         stack.callback(_clear, folder)
+        open_parts(folder, made_by)
         failed: list[dict[str, str]] = []
+        elsewhere: list[dict[str, str]] = []
         finished: list[Row] = []
         waiting: dict[Path, Task] = {}
         there = {} if older is None else _splits_by_digest(older)
         for song, digest in _digests(songs, failed).items():
             part = part_path(folder, title_of(song), digest)
             if there.get(digest, split) != split:
-                failed.append(_failure(song, f"is there already, of the split {there[digest]}"))
+                elsewhere.append(_failure(song, f"is there already, of the split {there[digest]}"))
             elif digest in there:
                 finished.append({})
             elif (kept := _kept_split(part)) is not None:
                 if kept == split:
                     finished.append({})
                 else:
-                    failed.append(_failure(song, f"was played already, for the split {kept}"))
+                    elsewhere.append(_failure(song, f"was played already, for the split {kept}"))
             else:
                 waiting[song] = Task(str(song.resolve()), digest, str(part.resolve()), split)
         _play(waiting, setup, jobs, ray, finished, failed, progress)
         progress("writing", 0, 0)
         result = _put_together(out, folder, older, made_by, failed, songs)
         close_parts(folder)
-    return result
+    return replace(result, failed=result.failed + elsewhere)
 
 
 def _clear(folder: Path) -> None:
     """Leave no folder of parts in which there are none."""
     if folder.exists() and not parts_in(folder):
-        close_parts(folder)
+        with suppress(OSError):  # It holds something of another program.
+            close_parts(folder)
 
 
 def _play(
@@ -221,6 +227,9 @@ def _play(
                 failed.append(_failure(song, row["error"]))
             else:
                 finished.append(row)
+                if row["remarks"]:
+                    told = "; ".join(row["remarks"])
+                    warnings.warn(f"{shown(song.name)}: {told}", stacklevel=2)
             report()
 
 
@@ -238,7 +247,12 @@ def _put_together(
     known = {row["source"]["digest"] for row in rows}
     parts = []
     for path in parts_in(folder):
-        part = load_part(path)
+        try:
+            part = load_part(path)
+        except InputError as error:
+            # Of a song that is not named this time, or it would have been played again.
+            warnings.warn(f"{error}; left out: name its song again to have it played", stacklevel=2)
+            continue
         assert part.source is not None
         if part.source.digest in known:  # It was put in, and the process killed thereafter.
             continue
@@ -263,13 +277,16 @@ def _put_together(
             yield load_part(path)
 
     if parts or missing != before:
+        kept = f"all that was played is kept in {folder}"
         try:
             write_trajectories(out, episodes(), Making(made_by, missing), data_card)
         except OSError as error:
             raise WorkFailed(
-                f"{out}: cannot be written: {error.strerror or error}; all that was played is kept "
-                f"in {folder}, and the same command goes on"
+                f"{out}: cannot be written: {error.strerror or error}; {kept}, and the same "
+                "command goes on"
             ) from error
+        except InputError as error:
+            raise InputError(f"{error}; {kept}") from error
     data = TrajectoryData.open(out)
     f1 = sum(row["f1"] for row in data.episodes) / len(data)
     hours = int(data.ends[-1]) / FRAME_RATE / _HOUR
@@ -331,13 +348,19 @@ def _try_out(player: Player, noise: float) -> None:
 def _digests(songs: list[Path], failed: list[dict[str, str]]) -> dict[Path, str]:
     """Digests of files that can be read, each content once; failures are added to the list."""
     found: dict[str, Path] = {}
+    same: list[Path] = []
     for song in songs:
         try:
             digest = files_digest([song])
         except OSError as error:
             failed.append(_failure(song, error.strerror or str(error)))
             continue
-        found.setdefault(digest, song)
+        if found.setdefault(digest, song) != song:
+            same.append(song)
+    if same:
+        more = f" and {len(same) - 1} more" if len(same) > 1 else ""
+        told = f"{shown(same[0].name)}{more}"
+        warnings.warn(f"{told}: the same content as another file, played once", stacklevel=2)
     return {song: digest for digest, song in found.items()}
 
 

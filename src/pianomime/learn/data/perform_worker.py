@@ -59,7 +59,8 @@ def load_perform_worker(setup: dict[str, Any]) -> Answer:
 
     Returns:
         What plays the song of a `Task`, given by its attributes, and keeps the episode. The row has
-        its `frames` and `f1`; or `unwritable`, the reason why it cannot be kept.
+        its `frames` and `f1`, and `remarks`, what was mended or left out when the file was read;
+        or `unwritable`, the reason why it cannot be kept.
     """
     casting = Casting.of(
         setup["player"], setup["effort"], setup["seed"], setup["world"], **setup["settings"]
@@ -82,7 +83,8 @@ def load_perform_worker(setup: dict[str, Any]) -> Answer:
         except OSError as error:
             # No fault of the song: the next one could not be kept either.
             return {"unwritable": error.strerror or str(error)}
-        return {"frames": len(episode.columns["goal"]), "f1": episode.f1}
+        frames = len(episode.columns["goal"])
+        return {"frames": frames, "f1": episode.f1, "remarks": list(whole.remarks)}
 
     return answer
 
@@ -117,9 +119,7 @@ def play_as_episode(
     if noise:
         spread = noise_spread(noise * rng.random())
         controller = NoisyController(controller, None, spread, DaggerConfig.noise_correlation, rng)
-    columns, qpos, events, blow_ups = record(controller, score, player.world, player.touch)
-    if blow_ups:
-        raise InputError(f"the physics broke in {blow_ups} of {len(qpos)} frames")
+    columns, qpos, events = record(controller, score, player.world, player.touch)
     # Late: some plan while they play.
     plan = controller.plan
     if plan is None:

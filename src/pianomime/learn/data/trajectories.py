@@ -34,7 +34,14 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from pianomime.errors import InputError, reason_of
 from pianomime.files import new_folder
 from pianomime.learn.data.episode import COLUMNS, EVENTS, Column, Episode, Source
-from pianomime.learn.data.format import FORMAT, VERSION, is_data_set, zarr_attributes
+from pianomime.learn.data.format import (
+    ATTRIBUTES,
+    FORMAT,
+    MOST_BYTES,
+    VERSION,
+    is_data_set,
+    zarr_attributes,
+)
 from pianomime.schema import Field, ListOf, Schema, check_json, short
 from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
@@ -119,7 +126,7 @@ def write_trajectories(
 
     Raises:
         InputError: there is something else at the place, another process writes there, there are
-            no episodes, or they were played in different worlds.
+            no episodes or too many, or they were played in different worlds.
         OSError: it cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -180,6 +187,8 @@ def write_trajectories(
             "failed": making.failed,
         }
         group.attrs.update(sealed(content))
+        if (fresh / ATTRIBUTES).stat().st_size > MOST_BYTES:
+            raise InputError(f"{path}: {len(rows)} episodes are too many for one data set")
         if card is not None:
             (fresh / "README.md").write_text(card(fresh), "utf-8")
     return len(rows)
