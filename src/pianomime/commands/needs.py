@@ -14,9 +14,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pianomime.commands.extras import extra
-from pianomime.errors import InputError
+from pianomime.errors import InputError, closest
 from pianomime.learn.data.format import is_data_set, training_songs, zarr_attributes
 from pianomime.learn.goal.config import RESULT
+from pianomime.songs import names
 from pianomime.songs.find import find_song, find_songs
 
 TRAIN = (
@@ -63,7 +64,7 @@ def need_songs(folders: Sequence[Path], least: int = 1) -> None:
     """Refuse folders with too few songs.
 
     Args:
-        folders: of MIDI files.
+        folders: of MIDI files; also files, and names of bundled songs, but no parts of such.
         least: number of songs that are needed.
 
     Raises:
@@ -75,6 +76,11 @@ def need_songs(folders: Sequence[Path], least: int = 1) -> None:
         # What is passed over is told when they are read.
         warnings.simplefilter("ignore")
         number = len(find_songs(folders))
+    for folder in folders:
+        # A folder that was mistyped may be a part of a bundled song's name.
+        if not folder.exists() and str(folder) not in names():
+            hint = closest(str(folder), names())
+            raise InputError(f"{folder}: no such folder, file or bundled song{hint}")
     if number < least:
         raise InputError(
             f"{least} songs at least are needed, some of them for validation; there are {number}"
