@@ -190,6 +190,39 @@ def test_what_makes_no_data_set_is_refused_at_once(
     assert sorted(each.name for each in tmp_path.iterdir()) == ["songs"]
 
 
+@pytest.mark.parametrize(
+    ("names", "split", "suggested"),
+    [(["one", "two"], "train", True), (["one"], "train", False), (["one", "two"], "test", False)],
+)
+def test_a_training_is_suggested_where_it_can_be_done(
+    songs: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    names: list[str],
+    split: str,
+    suggested: bool,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    paths = [str(songs / f"{name}.mid") for name in names]
+    options = ["--split", split, "--seconds", str(SECONDS), "--jobs", "1"]
+    main(["perform", *paths, "-o", "songs.zarr", *options])
+    (*_, last) = capsys.readouterr().out.splitlines()
+    _, found, suggestion = last.partition("train a policy of it: pianomime ")
+    assert bool(found) == suggested
+    if suggested:
+        trained: list[str] = []
+
+        def train(name: str, *_: object) -> Path:
+            trained.append(name)
+            return Path("policy.onnx")
+
+        monkeypatch.setattr("pianomime.learn.imitation.training.train_policy", train)
+        # What it needs is there.
+        main(suggestion.split())
+        assert trained == ["low-mse"]
+
+
 def test_what_fails_is_told_and_the_rest_is_kept(
     songs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
