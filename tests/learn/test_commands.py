@@ -157,7 +157,7 @@ MISSING: list[tuple[list[str], str]] = [
         ["train", "high-diff-no-sdf", "--demonstrations", "demo.npz", "-o", "file"],
         "file: is a file",
     ),
-    (["train-stage", "fingering", "--experts", "no.zarr"], "does not exist; `pianomime "),
+    (["train-stage", "fingering", "--experts", "no.zarr"], "`pianomime perform MIDI_FOLDER -o"),
     (["train-stage", "hand-motion", "--experts", "file"], "file: not a data set"),
     (["train-goal"], "FOLDER is missing"),
     (["train-goal", "empty"], "no MIDI files"),

@@ -37,7 +37,10 @@ TRAIN = (
 RAY = ("ray",)
 """What the extra "scale" adds to them."""
 
-_MAKES_DATA = "`pianomime collect-dagger DEMOS -o DATA` makes a data set of demonstrations"
+_MAKES_DATA = (
+    "`pianomime collect-dagger DEMOS -o DATA` makes a data set of demonstrations, "
+    "`pianomime perform MIDI_FOLDER -o DATA` one of songs"
+)
 _MAKES_DEMOS = (
     "`pianomime import-demos` makes demonstrations of the published data, `pianomime retarget` one "
     "of a video"
@@ -166,7 +169,7 @@ def need_experts(path: Path) -> None:
 
 
 def need_data_sets(paths: Sequence[Path]) -> None:
-    """Refuse what are no data sets of `pianomime collect` or `pianomime collect-dagger`.
+    """Refuse what are no data sets of `pianomime collect`, `collect-dagger` or `perform`.
 
     Raises:
         InputError: one is not there, or something else, and the message says what makes it; or
