@@ -15,8 +15,10 @@ The attribute `description` of every array says what it holds; the attribute `ep
 has the name, the F1, the base controller, the song, the split, the world and the source of each
 episode.
 
-Every chunk ends with a checksum (CRC32C), which all readers of zarr compare. The attributes have a
-digest of each column of each episode, too: a chunk that is gone reads as zeros.
+Every chunk of what was recorded ends with a checksum (CRC32C), which all readers of zarr compare.
+Those of `episode_end` and `event_end` do not: they are compared with the attributes, which say the
+same. The attributes have a digest of each column of each episode, too: a chunk that is gone reads
+as zeros.
 """
 
 from __future__ import annotations
