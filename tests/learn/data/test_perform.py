@@ -115,6 +115,8 @@ def test_it_reads_with_zarr_alone_and_has_a_card(songs: Path, tmp_path: Path) ->
     assert "2 episodes of 2 songs" in rest
     assert "Songs that could not be played: 1" in rest
     assert "broken" in rest
+    for name in TrajectoryData.open(out).episodes[0]:
+        assert f"`{name}`" in rest
     for name, column in COLUMNS.items():
         shape = ", ".join(map(str, (ends[-1], *column.shape)))
         assert f"| `{name}` | ({shape}) | {column.dtype} |" in rest
