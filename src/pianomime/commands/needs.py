@@ -15,7 +15,12 @@ from pathlib import Path
 
 from pianomime.commands.extras import extra
 from pianomime.errors import InputError, closest
-from pianomime.learn.data.format import is_data_set, training_songs, zarr_attributes
+from pianomime.learn.data.format import (
+    is_data_set,
+    training_songs,
+    why_no_data_set,
+    zarr_attributes,
+)
 from pianomime.learn.goal.config import RESULT
 from pianomime.songs import names
 from pianomime.songs.find import find_song, find_songs
@@ -198,7 +203,7 @@ def _need_data_set(path: Path) -> None:
             f"{path}: holds runs, not a data set; `pianomime collect {path} -o DATA` makes one of "
             "what their experts play"
         )
-    raise InputError(f"{path}: not a data set of trajectories; {_MAKES_DATA}")
+    raise InputError(f"{path}: {why_no_data_set(path)}; {_MAKES_DATA}")
 
 
 def need_place_for_data_set(out: Path) -> None:

@@ -5,17 +5,31 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pianomime.errors import InputError
 from pianomime.sealed_json import read_json
 
 FORMAT = "pianomime experts"
 VERSION = 5
 """Of the data set; version 4 had no events."""
+_METADATA = "zarr.json"
+"""The file in which zarr keeps what is known of a group."""
 
 
 def is_data_set(path: Path) -> bool:
     """Whether a folder is a data set of trajectories, of any version, perhaps a damaged one."""
     attributes = zarr_attributes(path)
     return attributes is not None and attributes.get("format") == FORMAT
+
+
+def why_no_data_set(path: Path) -> str:
+    """Why `is_data_set` does not hold, for a message."""
+    try:
+        read_json(path / _METADATA)
+    except InputError as error:
+        return f"damaged ({_METADATA}: {error})"
+    except OSError:
+        pass
+    return "not a data set of trajectories"
 
 
 def training_songs(path: Path) -> dict[int | str, str]:
@@ -32,7 +46,7 @@ def training_songs(path: Path) -> dict[int | str, str]:
 def zarr_attributes(path: Path) -> dict[str, Any] | None:
     """The attributes of a zarr 3 group; None if a folder is none."""
     try:
-        attributes = read_json(path / "zarr.json")["attributes"]
+        attributes = read_json(path / _METADATA)["attributes"]
     except (OSError, ValueError, LookupError, TypeError):
         return None
     return attributes if isinstance(attributes, dict) else None

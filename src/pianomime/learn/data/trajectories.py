@@ -36,7 +36,13 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from pianomime.errors import InputError, reason_of
 from pianomime.files import new_folder
 from pianomime.learn.data.episode import COLUMNS, EVENTS, Column, Episode, Source
-from pianomime.learn.data.format import FORMAT, VERSION, is_data_set, zarr_attributes
+from pianomime.learn.data.format import (
+    FORMAT,
+    VERSION,
+    is_data_set,
+    why_no_data_set,
+    zarr_attributes,
+)
 from pianomime.schema import Field, ListOf, Schema, check_json, short
 from pianomime.seal import seal_of
 from pianomime.sealed_json import sealed, unsealed
@@ -192,6 +198,7 @@ class TrajectoryData:
     """A data set on disk.
 
     Attributes:
+        path: of the data set, as it was given.
         group: the zarr group.
         ends: (E,) one past the last row of each episode.
         event_ends: (E,) one past the last event of each episode.
@@ -200,6 +207,7 @@ class TrajectoryData:
         making: how it was made.
     """
 
+    path: Path
     group: zarr.Group
     ends: NDArray[np.int64]
     event_ends: NDArray[np.int64]
@@ -217,7 +225,7 @@ class TrajectoryData:
         """
         attributes = zarr_attributes(path)
         if attributes is None or attributes.get("format") != FORMAT:
-            raise InputError(f"{path}: not a data set of trajectories")
+            raise InputError(f"{path}: {why_no_data_set(path)}")
         if attributes.get("version") != VERSION:
             raise InputError(
                 f"{path}: a data set of version {short(attributes.get('version'))}; this program "
@@ -254,7 +262,7 @@ class TrajectoryData:
         # Data sets that do not say it were played in the paper's.
         episodes = [{"world": PAPER, **facts} for facts in content["episodes"]]
         making = Making(content["settings"], content["failed"])
-        return cls(group, ends, event_ends, episodes, making)
+        return cls(path, group, ends, event_ends, episodes, making)
 
     def __len__(self) -> int:
         """Number of episodes."""
@@ -278,7 +286,7 @@ class TrajectoryData:
                     raise InputError(f"{name} of episode {number} is not finite")
         # A damaged store raises what its codecs happen to raise.
         except Exception as error:
-            raise InputError(f"{self.group.store_path}: damaged ({reason_of(error)})") from error
+            raise InputError(f"{self.path}: damaged ({reason_of(error)})") from error
         return columns
 
     def episode(self, number: int) -> Episode:
@@ -345,7 +353,10 @@ class _Appender:
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
-    array = group[name]
+    try:
+        array = group[name]
+    except KeyError:
+        raise InputError(f"the array {name} is missing") from None
     if not isinstance(array, zarr.Array):
         raise TypeError(f"{name} is no array")
     return array
