@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 from pianomime import Performance, evaluate, songs
-from pianomime.errors import InputError
+from pianomime.cli import main
+from pianomime.errors import InputError, WorkFailed
+from pianomime.evaluation import evaluation
 from pianomime.evaluation.song_worker import SONG_WORKER, song_request
 from pianomime.evaluation.table import markdown
 from pianomime.music import protocol_digest
@@ -188,6 +190,49 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
     assert {file: file.stat().st_mtime_ns for file in done} == done
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such limits")
+def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_after(
+    folder: Path, tmp_path: Path
+) -> None:
+    import resource
+
+    out = tmp_path / "out"
+    one, two = (str(folder / f"{name}.mid") for name in songs.names()[:2])
+    evaluate(one, "zero-shot-ik", seconds=1.0, jobs=1, out=out)
+    done = {file: file.stat().st_mtime_ns for file in out.rglob("*.*")}
+    options = ["-o", str(out), "--player", "zero-shot-ik", "--seconds", "1", "--jobs", "1"]
+    # The system refuses files that are longer, as it does on a full disk.
+    most = 5000
+    process = subprocess.run(
+        [sys.executable, "-m", "pianomime", "evaluate", one, two, *options],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
+    )
+    assert process.returncode == 1
+    (line,) = process.stderr.splitlines()
+    assert line.startswith(f"pianomime: {Path(two).name}: cannot be kept: File too large; all that")
+    assert {file: file.stat().st_mtime_ns for file in out.rglob("*.*")} == done
+
+    results = evaluate([one, two], "zero-shot-ik", seconds=1.0, jobs=1, out=out)
+    assert ["f1" in row for row in results["songs"]] == [True, True]
+    assert {file.stat().st_mtime_ns for file in out.glob("songs/*")} >= {
+        time for file, time in done.items() if file.parent == out / "songs"
+    }
+
+
+def test_a_row_that_cannot_be_written_ends_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(evaluation, "atomic", full)
+    with pytest.raises(WorkFailed, match=r"json: cannot be kept: No space left on device; all"):
+        evaluate(songs.names()[0], "zero-shot-ik", seconds=0.5, jobs=1, out=tmp_path)
+
+
 def test_a_crash_costs_one_song(folder: Path) -> None:
     song = folder / f"{songs.names()[0]}.mid"
     setup = {"player": "zero-shot", "effort": 0, "seed": 0, "settings": {}}
@@ -258,6 +303,22 @@ def test_when_all_fail_there_is_no_mean(tmp_path: Path) -> None:
     assert results["causes"] == {"missed": {}, "wrong": {}}
     assert "failed" in markdown(results)
     assert list(tmp_path.iterdir()) == [tmp_path / "broken.mid"]
+
+
+def test_the_command_fails_when_all_songs_do(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken, out = folder / "broken|one.mid", tmp_path / "out"
+    options = ["-o", str(out), "--player", "zero-shot-ik", "--seconds", "0.5", "--jobs", "1"]
+    with pytest.raises(SystemExit) as stopped:
+        main(["evaluate", str(broken), *options])
+    assert stopped.value.code == 1
+    said = capsys.readouterr()
+    (line,) = said.err.splitlines()
+    assert line.startswith("pianomime: no song could be played: broken|one: ")
+    assert f"saved: {out / 'results.json'}" in said.out
+    assert "error" in json.loads((out / "results.json").read_text(encoding="utf-8"))["songs"][0]
+    main(["evaluate", str(broken), songs.names()[0], *options])
 
 
 def test_folders_are_searched_and_nothing_is_found_twice(folder: Path) -> None:

@@ -118,8 +118,9 @@ class CollectDagger:
 
     def _some(self, all_of_them: list[_Item]) -> list[_Item]:
         """As many as are wanted, evenly spread."""
-        limit = self.config.max_demonstrations
-        return all_of_them[:: -(-len(all_of_them) // limit)] if limit else all_of_them
+        number = len(all_of_them)
+        limit = min(self.config.max_demonstrations or number, number)
+        return [all_of_them[each * number // limit] for each in range(limit)]
 
     def _episodes(
         self, songs: list[Path], progress: Progress, f1: list[float]

@@ -19,7 +19,8 @@ class Evaluate:
     OUT then holds results.json, results.md, and in songs/ the performance of each song, for
     `pianomime report` and `pianomime diagnose`: some 1 MB for a minute of music. It may be deleted:
     the song is not played again for it. An evaluation that was interrupted resumes where it was
-    when it is started again with the same OUT. A song that fails is a line of the table.
+    when it is started again with the same OUT. A song that fails is a line of the table; if all
+    fail, the exit code is 1.
 
     Settings of the player are options too, such as --planner.beam 200: `pianomime players
     zero-shot` lists those of the zero-shot player.
@@ -89,9 +90,11 @@ class Evaluate:
 
         Raises:
             InputError: a path stands for no song, or there is no such player.
+            WorkFailed: no song could be played, or OUT cannot be written any more.
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.progress import bars
+        from pianomime.errors import WorkFailed
         from pianomime.evaluation.evaluation import evaluate
         from pianomime.evaluation.robustness import robust_markdown, robustness
         from pianomime.evaluation.table import markdown
@@ -135,3 +138,6 @@ class Evaluate:
             worst = min(kept, key=lambda row: float(row["music"]["note_f1_50"]))
             path = command_word(out / worst["performance"])
             print(f"hear the lowest note F1, {worst['song']}: pianomime report {path}")
+        if all("error" in row for row in results["songs"]):
+            first = results["songs"][0]
+            raise WorkFailed(f"no song could be played: {first['song']}: {first['error']}")

@@ -11,6 +11,9 @@ import tyro
 from pianomime.camera_names import CameraName
 from pianomime.learn.export.data_export import DataFormat
 
+_SIZE = (320, 136)
+"""Width and height of pictures [pixels]."""
+
 
 @dataclass(frozen=True)
 class ExportData:
@@ -41,27 +44,31 @@ class ExportData:
     camera: Annotated[CameraName | None, tyro.conf.arg(help_behavior_hint="")] = None
     """For lerobot: whose pictures of the recorded states are rendered, which needs OpenGL; player
     looks over the player's shoulders."""
-    size: Annotated[tuple[int, int], tyro.conf.arg(metavar="W H")] = (320, 136)
-    """Width and height of these pictures [pixels], even. Player and top see all keys where the
-    width is at least 2.3 times the height."""
+    size: Annotated[tuple[int, int] | None, tyro.conf.arg(metavar="W H", help_behavior_hint="")] = (
+        None
+    )
+    """Width and height of these pictures [pixels], even; 320 136 if not given. Player and top see
+    all keys where the width is at least 2.3 times the height."""
 
     def run(self) -> None:
         """Export, and print what it holds.
 
         Raises:
             InputError: there is no data set, it is damaged, something else than an export is at the
-                place, there is no such picture, or a package is missing.
+                place, there is no such picture, a size is given for none, or a package is missing.
             WorkFailed: this machine cannot render.
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.extras import extra
         from pianomime.commands.needs import need_folder, need_packages
         from pianomime.commands.progress import bars
-        from pianomime.errors import WorkFailed
+        from pianomime.errors import InputError, WorkFailed
         from pianomime.learn.export.data_export import PACKAGES, export_data
         from pianomime.progress import telling
         from pianomime.shown import shown
 
+        if self.size is not None and self.camera is None:
+            raise InputError("--size: is that of pictures; name their camera with --camera")
         need_packages("data", PACKAGES[self.format])
         need_folder(self.out.absolute().parent)
         with extra("data"), bars() as progress, telling(progress):
@@ -69,7 +76,7 @@ class ExportData:
             from pianomime.world.render import RenderUnavailable, View
 
             data = TrajectoryData.open(self.data)
-            view = None if self.camera is None else View(self.camera, self.size)
+            view = None if self.camera is None else View(self.camera, self.size or _SIZE)
             try:
                 export_data(data, self.out, self.format, view)
             except RenderUnavailable as error:

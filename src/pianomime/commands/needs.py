@@ -14,9 +14,15 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from pianomime.commands.extras import extra
-from pianomime.errors import InputError
-from pianomime.learn.data.format import is_data_set, training_songs, zarr_attributes
+from pianomime.errors import InputError, closest
+from pianomime.learn.data.format import (
+    is_data_set,
+    training_songs,
+    why_no_data_set,
+    zarr_attributes,
+)
 from pianomime.learn.goal.config import RESULT
+from pianomime.songs import names
 from pianomime.songs.find import find_song, find_songs
 
 TRAIN = (
@@ -36,7 +42,10 @@ TRAIN = (
 RAY = ("ray",)
 """What the extra "scale" adds to them."""
 
-_MAKES_DATA = "`pianomime collect-dagger DEMOS -o DATA` makes a data set of demonstrations"
+_MAKES_DATA = (
+    "`pianomime collect-dagger DEMOS -o DATA` makes a data set of demonstrations, "
+    "`pianomime perform MIDI_FOLDER -o DATA` one of songs"
+)
 _MAKES_DEMOS = (
     "`pianomime import-demos` makes demonstrations of the published data, `pianomime retarget` one "
     "of a video"
@@ -63,7 +72,7 @@ def need_songs(folders: Sequence[Path], least: int = 1) -> None:
     """Refuse folders with too few songs.
 
     Args:
-        folders: of MIDI files.
+        folders: of MIDI files; also files, and names of bundled songs, but no parts of such.
         least: number of songs that are needed.
 
     Raises:
@@ -75,6 +84,11 @@ def need_songs(folders: Sequence[Path], least: int = 1) -> None:
         # What is passed over is told when they are read.
         warnings.simplefilter("ignore")
         number = len(find_songs(folders))
+    for folder in folders:
+        # A folder that was mistyped may be a part of a bundled song's name.
+        if not folder.exists() and str(folder) not in names():
+            hint = closest(str(folder), names())
+            raise InputError(f"{folder}: no such folder, file or bundled song{hint}")
     if number < least:
         raise InputError(
             f"{least} songs at least are needed, some of them for validation; there are {number}"
@@ -160,7 +174,7 @@ def need_experts(path: Path) -> None:
 
 
 def need_data_sets(paths: Sequence[Path]) -> None:
-    """Refuse what are no data sets of `pianomime collect` or `pianomime collect-dagger`.
+    """Refuse what are no data sets of `pianomime collect`, `collect-dagger` or `perform`.
 
     Raises:
         InputError: one is not there, or something else, and the message says what makes it; or
@@ -189,7 +203,7 @@ def _need_data_set(path: Path) -> None:
             f"{path}: holds runs, not a data set; `pianomime collect {path} -o DATA` makes one of "
             "what their experts play"
         )
-    raise InputError(f"{path}: not a data set of trajectories; {_MAKES_DATA}")
+    raise InputError(f"{path}: {why_no_data_set(path)}; {_MAKES_DATA}")
 
 
 def need_place_for_data_set(out: Path) -> None:

@@ -32,7 +32,7 @@ class Perform:
       pianomime perform FOLDER -o recovering.zarr --noise 0.2
       pianomime perform FOLDER -o /shared/songs.zarr --ray HOST:6379
       pianomime perform HELD_OUT -o songs.zarr --split test
-      pianomime train low-diff --experts songs.zarr
+      pianomime train low-mse --experts songs.zarr
     """
 
     songs: Annotated[
@@ -82,6 +82,7 @@ class Perform:
         from pianomime.commands.needs import RAY, need_packages, need_place_for_data_set
         from pianomime.commands.progress import bars
         from pianomime.errors import WorkFailed
+        from pianomime.learn.data.format import training_songs
         from pianomime.validation import within
 
         if self.jobs is not None:
@@ -115,7 +116,10 @@ class Perform:
         for row in done.failed[:_TOLD]:
             print(f"failed: {row['song']}: {row['error']}")
         print(f"saved: {shown(self.out)}")
-        print(f"train a policy of it: pianomime train low-diff --experts {command_word(self.out)}")
+        # A training keeps some songs for validation, and takes none of the split test.
+        if len(training_songs(self.out)) > 1:
+            data = command_word(self.out)
+            print(f"train a policy of it: pianomime train low-mse --experts {data}")
         if done.failed:
             more = f"{len(done.failed)} songs" if len(done.failed) > 1 else "1 song"
             raise WorkFailed(f"{more} could not be played; all others are in the data set")

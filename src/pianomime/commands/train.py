@@ -56,7 +56,7 @@ class Train:
     experts: Annotated[
         tuple[Path, ...], tyro.conf.arg(metavar="DATA...", help_behavior_hint="")
     ] = ()
-    """Data sets made by `pianomime collect-dagger` or `pianomime collect`."""
+    """Data sets made by `pianomime collect-dagger`, `collect` or `perform`."""
     goal: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")] = None
     """Folder of the goal encoder; OUT/goal if not given, and that of the pretrained policy where
     there is one."""

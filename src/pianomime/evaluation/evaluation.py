@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pianomime
-from pianomime.errors import InputError
+from pianomime.errors import InputError, WorkFailed
 from pianomime.evaluation.diagnose import CAUSES_SCHEMA
 from pianomime.evaluation.mean import mean
 from pianomime.evaluation.song_worker import SONG_WORKER, play_song, song_request
@@ -103,6 +103,8 @@ def evaluate(
     Raises:
         InputError: a path stands for no song, or there is no such player, world or setting, or it
             does not play in that world, or its files cannot be read, or it takes no lead-in.
+        WorkFailed: `out` cannot be written any more. Songs that were finished are kept, and the
+            same call goes on.
         OSError: `out` cannot be written.
     """
     songs = find_songs([paths] if isinstance(paths, str | Path) else paths)
@@ -183,6 +185,8 @@ def evaluate(
                 playing = on_cluster(SONG_WORKER, waiting, ray, setup, request)
         with closing(playing) as played:
             for song, result in played:
+                if "unwritable" in result:
+                    raise _unwritable(song.name, result["unwritable"])
                 row = {"song": title_of(song), **result}
                 if store is not None and "error" not in row:
                     row = store.put(song, row)
@@ -337,9 +341,20 @@ class _Store:
 
     @staticmethod
     def _write(path: Path, text: str) -> None:
-        with atomic(path) as temporary:
-            # Half a character, as in a setting that names a file, is written as JSON escapes it.
-            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
+        try:
+            with atomic(path) as temporary:
+                # Half a character, as in a setting that names a file, is written as JSON escapes
+                # it.
+                temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
+        except OSError as error:
+            raise _unwritable(path.name, error.strerror or str(error)) from error
+
+
+def _unwritable(name: str, reason: str) -> WorkFailed:
+    return WorkFailed(
+        f"{shown(name)}: cannot be kept: {reason}; all that was finished before is, and the same "
+        "command goes on"
+    )
 
 
 def _json(content: dict[str, Any]) -> str:

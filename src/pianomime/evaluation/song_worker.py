@@ -55,17 +55,22 @@ def play_song(
 
     Returns:
         The row: the summary, with the name of the file as its `song`, and `causes`, the frames that
-        each cause cost, if the player plans.
+        each cause cost, if the player plans; or `unwritable`, the reason why the performance cannot
+        be kept.
 
     Raises:
         InputError: the file cannot be read, or this player cannot play it.
-        OSError: the performance cannot be written.
+        OSError: the file cannot be read.
     """
     song = Path(request["song"])
     player, score = casting.cast(song, 0.0, seconds, lead_in)
     performance = player.play(score)
     if "performance" in request:
-        performance.save(request["performance"])
+        try:
+            performance.save(request["performance"])
+        except OSError as error:
+            # No fault of the song: the next one could not be kept either.
+            return {"unwritable": error.strerror or str(error)}
     # Two files can bear one title, but not one name in a folder.
     row: dict[str, Any] = {**summarize(performance), "song": title_of(song)}
     if performance.plan is not None:

@@ -60,17 +60,18 @@ def test_episodes_are_the_same_however_many_are_played_at_once(two_notes):
     assert not np.array_equal(alone[0], alone[1])
 
 
-def test_the_command_makes_a_data_set(two_notes, tmp_path, capsys):
+@pytest.mark.parametrize(("limit", "songs"), [(2, [0, 2]), (4, [0, 1, 2, 3]), (9, [0, 1, 2, 3, 4])])
+def test_the_command_plays_as_many_as_are_wanted(two_notes, tmp_path, capsys, limit, songs):
     for number in range(5):
         replace(two_notes, song_id=number).save(tmp_path / f"{number}.npz")
     replace(two_notes, split="test").save(tmp_path / "not for training.npz")
     out = tmp_path / "dagger.zarr"
     cli.main(
         ["collect-dagger", str(tmp_path), "-o", str(out), "--jobs", "1"]
-        + ["--max-demonstrations", "2"]
+        + ["--max-demonstrations", str(limit)]
     )
-    assert "played: 2," in capsys.readouterr().out
-    assert [episode["song_id"] for episode in TrajectoryData.open(out).episodes] == [0, 3]
+    assert f"played: {len(songs)}," in capsys.readouterr().out
+    assert [episode["song_id"] for episode in TrajectoryData.open(out).episodes] == songs
 
 
 @pytest.mark.parametrize(

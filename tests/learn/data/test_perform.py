@@ -116,6 +116,8 @@ def test_it_reads_with_zarr_alone_and_has_a_card(songs: Path, tmp_path: Path) ->
     assert "2 episodes of 2 songs" in rest
     assert "Songs that could not be played: 1" in rest
     assert "broken" in rest
+    for name in TrajectoryData.open(out).episodes[0]:
+        assert f"`{name}`" in rest
     for name, column in COLUMNS.items():
         shape = ", ".join(map(str, (ends[-1], *column.shape)))
         assert f"| `{name}` | ({shape}) | {column.dtype} |" in rest
@@ -193,6 +195,39 @@ def test_what_makes_no_data_set_is_refused_at_once(
         made(songs, out, **given)
     assert "\n" not in str(error.value)
     assert sorted(each.name for each in tmp_path.iterdir()) == ["songs"]
+
+
+@pytest.mark.parametrize(
+    ("names", "split", "suggested"),
+    [(["one", "two"], "train", True), (["one"], "train", False), (["one", "two"], "test", False)],
+)
+def test_a_training_is_suggested_where_it_can_be_done(
+    songs: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    names: list[str],
+    split: str,
+    suggested: bool,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    paths = [str(songs / f"{name}.mid") for name in names]
+    options = ["--split", split, "--seconds", str(SECONDS), "--jobs", "1"]
+    main(["perform", *paths, "-o", "songs.zarr", *options])
+    (*_, last) = capsys.readouterr().out.splitlines()
+    _, found, suggestion = last.partition("train a policy of it: pianomime ")
+    assert bool(found) == suggested
+    if suggested:
+        trained: list[str] = []
+
+        def train(name: str, *_: object) -> Path:
+            trained.append(name)
+            return Path("policy.onnx")
+
+        monkeypatch.setattr("pianomime.learn.imitation.training.train_policy", train)
+        # What it needs is there.
+        main(suggestion.split())
+        assert trained == ["low-mse"]
 
 
 def test_what_fails_is_told_and_the_rest_is_kept(

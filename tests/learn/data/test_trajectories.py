@@ -13,6 +13,7 @@ import pytest
 import zarr
 
 from pianomime.commands.collect import Collect
+from pianomime.commands.needs import need_data_sets
 from pianomime.errors import InputError
 from pianomime.learn.data.dataset import trajectory_dataset
 from pianomime.learn.data.episode import COLUMNS, EVENTS, Column, Episode, Source
@@ -192,6 +193,32 @@ def test_a_damaged_data_set_is_one_line(two_notes: Demonstration, tmp_path: Path
         (out / file).write_text(text)
         with pytest.raises(InputError, match=r"damaged|not a data set"):
             TrajectoryData.open(out)
+
+
+def test_damage_names_the_path_as_it_was_given_and_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    out = Path("d2.zarr")
+    write_trajectories(out, iter([random_episode(4, 50, 0)]))
+    data = TrajectoryData.open(out)
+    (out / "event_key" / "c" / "0").unlink()
+    with pytest.raises(
+        InputError, match=r"^d2\.zarr: damaged \(event_key of episode 0 was changed"
+    ):
+        data.episode(0)
+    (out / "event_time" / "zarr.json").unlink()
+    with pytest.raises(
+        InputError, match=r"^d2\.zarr: damaged \(the array event_time is missing\)$"
+    ):
+        TrajectoryData.open(out)
+    text = (out / "zarr.json").read_text()
+    (out / "zarr.json").write_text(text[: len(text) // 2])
+    damaged = r"^d2\.zarr: damaged \(zarr\.json: it is not JSON\)"
+    with pytest.raises(InputError, match=damaged):
+        TrajectoryData.open(out)
+    with pytest.raises(InputError, match=f"{damaged}; `pianomime"):
+        need_data_sets([out])
 
 
 @pytest.mark.parametrize("how", ["gone", "swapped", "flipped", "f1", "chunk shape", "a day"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -145,6 +146,21 @@ def test_lerobot_reads_what_was_written(data: TrajectoryData, tmp_path: Path) ->
         np.testing.assert_allclose(stats[feature]["std"], values.std(0), atol=1e-6)
         np.testing.assert_allclose(stats[feature]["q10"], np.quantile(values, 0.1, 0), atol=1e-6)
     assert sum(1 for _ in (out / "data").rglob("*.parquet")) == 1
+
+
+def test_lerobot_is_written_where_a_name_is_no_utf8(data: TrajectoryData, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow", reason="the extra data is not installed")
+    odd, plain = tmp_path / os.fsdecode(b"e \xff"), tmp_path / "plain"
+    try:
+        odd.mkdir()
+    except OSError:
+        pytest.skip("this file system allows no such name")
+    odd.rmdir()
+    for out in (odd, plain):
+        export_data(data, out, "lerobot")
+    assert {file.relative_to(odd): file.read_bytes() for file in odd.rglob("*.*")} == {
+        file.relative_to(plain): file.read_bytes() for file in plain.rglob("*.*")
+    }
 
 
 def test_files_and_chunks_are_begun_where_one_is_full(

@@ -90,7 +90,10 @@ class Dataset:
     def split(self) -> tuple[Dataset, Dataset]:
         """Training and validation sets, which have no song in common.
 
-        Which songs are kept for validation does not depend on what else is in the data set.
+        A song is kept for validation if the hash of its number is low, about one in twelve,
+        whatever else is in the data set. Only where that would be none or all of the songs, it
+        depends on the others: the song with the lowest hash is then kept, or all but the one with
+        the highest.
         """
         validation = _is_validation(self.song_id)
         return self.subset(~validation), self.subset(validation)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pianomime.errors import InputError
 from pianomime.sealed_json import read_json
 
 ATTRIBUTES = "zarr.json"
@@ -20,6 +21,17 @@ def is_data_set(path: Path) -> bool:
     """Whether a folder is a data set of trajectories, of any version, perhaps a damaged one."""
     attributes = zarr_attributes(path)
     return attributes is not None and attributes.get("format") == FORMAT
+
+
+def why_no_data_set(path: Path) -> str:
+    """Why `is_data_set` does not hold, for a message."""
+    try:
+        read_json(path / ATTRIBUTES, MOST_BYTES)
+    except InputError as error:
+        return f"damaged ({ATTRIBUTES}: {error})"
+    except OSError:
+        pass
+    return "not a data set of trajectories"
 
 
 def training_songs(path: Path) -> dict[int | str, str]:

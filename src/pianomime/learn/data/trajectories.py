@@ -15,8 +15,10 @@ The attribute `description` of every array says what it holds; the attribute `ep
 has the name, the F1, the base controller, the song, the split, the world and the source of each
 episode.
 
-Every chunk ends with a checksum (CRC32C), which all readers of zarr compare. The attributes have a
-digest of each column of each episode, too: a chunk that is gone reads as zeros.
+Every chunk of what was recorded ends with a checksum (CRC32C), which all readers of zarr compare.
+Those of `episode_end` and `event_end` do not: they are compared with the attributes, which say the
+same. The attributes have a digest of each column of each episode, too: a chunk that is gone reads
+as zeros.
 """
 
 from __future__ import annotations
@@ -40,6 +42,7 @@ from pianomime.learn.data.format import (
     MOST_BYTES,
     VERSION,
     is_data_set,
+    why_no_data_set,
     zarr_attributes,
 )
 from pianomime.schema import Field, ListOf, Schema, check_json, short
@@ -199,6 +202,7 @@ class TrajectoryData:
     """A data set on disk.
 
     Attributes:
+        path: of the data set, as it was given.
         group: the zarr group.
         ends: (E,) one past the last row of each episode.
         event_ends: (E,) one past the last event of each episode.
@@ -207,6 +211,7 @@ class TrajectoryData:
         making: how it was made.
     """
 
+    path: Path
     group: zarr.Group
     ends: NDArray[np.int64]
     event_ends: NDArray[np.int64]
@@ -224,7 +229,7 @@ class TrajectoryData:
         """
         attributes = zarr_attributes(path)
         if attributes is None or attributes.get("format") != FORMAT:
-            raise InputError(f"{path}: not a data set of trajectories")
+            raise InputError(f"{path}: {why_no_data_set(path)}")
         if attributes.get("version") != VERSION:
             raise InputError(
                 f"{path}: a data set of version {short(attributes.get('version'))}; this program "
@@ -261,7 +266,7 @@ class TrajectoryData:
         # Data sets that do not say it were played in the paper's.
         episodes = [{"world": PAPER, **facts} for facts in content["episodes"]]
         making = Making(content["settings"], content["failed"])
-        return cls(group, ends, event_ends, episodes, making)
+        return cls(path, group, ends, event_ends, episodes, making)
 
     def __len__(self) -> int:
         """Number of episodes."""
@@ -285,7 +290,7 @@ class TrajectoryData:
                     raise InputError(f"{name} of episode {number} is not finite")
         # A damaged store raises what its codecs happen to raise.
         except Exception as error:
-            raise InputError(f"{self.group.store_path}: damaged ({reason_of(error)})") from error
+            raise InputError(f"{self.path}: damaged ({reason_of(error)})") from error
         return columns
 
     def episode(self, number: int) -> Episode:
@@ -352,7 +357,10 @@ class _Appender:
 
 
 def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
-    array = group[name]
+    try:
+        array = group[name]
+    except KeyError:
+        raise InputError(f"the array {name} is missing") from None
     if not isinstance(array, zarr.Array):
         raise TypeError(f"{name} is no array")
     return array

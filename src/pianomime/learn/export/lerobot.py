@@ -159,7 +159,9 @@ def write_lerobot(data: TrajectoryData, folder: Path, view: View | None = None) 
         name: {stat: stats[stat].tolist() for stat in _STATS} for name, stats in of_all.items()
     }
     _write_json(folder / "meta" / "stats.json", stats_of_all)
-    pq.write_table(_tasks_table(tasks), folder / "meta" / "tasks.parquet")
+    # Not by its path, of which not every name can be turned into UTF-8.
+    with (folder / "meta" / "tasks.parquet").open("wb") as sink:
+        pq.write_table(_tasks_table(tasks), sink)
 
 
 def _features(

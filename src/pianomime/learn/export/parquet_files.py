@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,8 @@ class ParquetFiles(NumberedFiles):
         self._writer.write_table(pa.Table.from_pylist([row], self.schema))
 
     def _begin(self, path: Path, stack: ExitStack) -> None:
-        self._sink = stack.enter_context(pa.OSFile(str(path), "wb"))
+        # As bytes: those of a name need not be UTF-8, which text is turned into.
+        self._sink = stack.enter_context(pa.OSFile(os.fsencode(path), "wb"))
         self._writer = stack.enter_context(
             pq.ParquetWriter(self._sink, self.schema, compression="snappy")
         )
