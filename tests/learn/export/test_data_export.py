@@ -231,6 +231,16 @@ def test_only_exports_are_replaced(
     assert [each.name for each in tmp_path.iterdir()] == ["out-v0"]
 
 
+def test_an_export_within_the_data_set_is_refused(
+    data: TrajectoryData, path: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "link").symlink_to(path)
+    for place in (path, path / "export", tmp_path / "link" / "export"):
+        with pytest.raises(InputError, match="is in the data set itself"):
+            export_data(data, place, "lerobot")
+    assert not (path / "export").exists()
+
+
 @pytest.mark.parametrize("data_format", ["lerobot", "minari"])
 def test_what_fails_leaves_the_older_export(
     data: TrajectoryData, tmp_path: Path, data_format: DataFormat

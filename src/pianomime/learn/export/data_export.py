@@ -6,6 +6,7 @@ Cheap to import: no numpy, no zarr.
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -70,6 +71,8 @@ def export_data(
         from pianomime.learn.export.camera import check_view
 
         check_view(view)
+    if Path(os.path.realpath(path)).is_relative_to(os.path.realpath(data.path)):
+        raise InputError(f"{path}: is in the data set itself, with which it would go")
     path.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(path, is_data_export, "an export of a data set") as folder:
         folder.mkdir()
