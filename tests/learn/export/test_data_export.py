@@ -235,7 +235,7 @@ def test_an_export_within_the_data_set_is_refused(
     data: TrajectoryData, path: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "link").symlink_to(path)
-    for place in (path, path / "export", tmp_path / "link" / "export"):
+    for place in (path / "export", tmp_path / "link" / "export"):
         with pytest.raises(InputError, match="is in the data set itself"):
             export_data(data, place, "lerobot")
     assert not (path / "export").exists()

@@ -71,7 +71,7 @@ def export_data(
         from pianomime.learn.export.camera import check_view
 
         check_view(view)
-    if Path(os.path.realpath(path)).is_relative_to(os.path.realpath(data.path)):
+    if Path(os.path.realpath(path)).parent.is_relative_to(os.path.realpath(data.path)):
         raise InputError(f"{path}: is in the data set itself, with which it would go")
     path.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(path, is_data_export, "an export of a data set") as folder:
