@@ -85,7 +85,7 @@ class Collect:
                 need_demonstrations(self.demonstrations)
 
     def _episodes(self, progress: Progress) -> Generator[Episode, None, None]:
-        from pianomime.learn.data.episode import play_episode
+        from pianomime.learn.data.episode import PhysicsBroke, play_episode
         from pianomime.learn.data.published import published_episodes
         from pianomime.learn.expert.expert_run import ExpertRun, find_expert_runs
 
@@ -100,10 +100,9 @@ class Collect:
             found = find_expert_runs(path)
             progress("playing", 0, len(found))
             for done, folder in enumerate(found, 1):
-                run = ExpertRun.load(folder)
                 try:
-                    episode = play_episode(run)
-                except InputError as error:
+                    episode = play_episode(ExpertRun.load(folder))
+                except PhysicsBroke as error:
                     warnings.warn(f"left out: {folder}: {error}", stacklevel=2)
                 else:
                     yield episode

@@ -23,7 +23,7 @@ from pianomime.shown import shown
 
 @dataclass(frozen=True)
 class Train:
-    """Train one policy of a generalist, a player that plays every song, by imitation.
+    r"""Train one policy of a generalist, a player that plays every song, by imitation.
 
     Two-stage players need a high-level policy, from goals to fingertips, and a low-level one, from
     fingertips to controls. Policies with goal codes need a goal encoder first, see `pianomime

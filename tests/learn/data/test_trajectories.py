@@ -15,6 +15,7 @@ import zarr
 from pianomime.commands.collect import Collect
 from pianomime.commands.needs import need_data_sets
 from pianomime.errors import InputError
+from pianomime.learn.data import episode as episode_module
 from pianomime.learn.data.dataset import trajectory_dataset
 from pianomime.learn.data.episode import COLUMNS, EVENTS, Column, Episode, Source
 from pianomime.learn.data.format import VERSION
@@ -62,6 +63,24 @@ def test_episodes_are_what_the_experts_play(runs: Path, tmp_path: Path) -> None:
         np.testing.assert_allclose(columns["keys"][1:], performance.key_state[:-1], atol=1e-6)
         np.testing.assert_array_equal(columns["goal"], run.demonstration.score.roll())
         assert (episode.song_id, episode.split) == (42, "test")
+
+
+def test_experts_that_broke_the_physics_are_left_out_with_a_word(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    play, played = episode_module.play_episode, []
+
+    def broken(run: ExpertRun) -> Episode:
+        played.append(run)
+        if len(played) == 1:
+            raise episode_module.PhysicsBroke("the physics broke in 1 of 30 frames")
+        return play(run)
+
+    monkeypatch.setattr(episode_module, "play_episode", broken)
+    with pytest.warns(UserWarning, match="left out: .*a: the physics broke in 1 of 30 frames"):
+        Collect((runs,), tmp_path / "experts.zarr").run()
+    assert len(played) == 2
+    assert len(TrajectoryData.open(tmp_path / "experts.zarr")) == 1
 
 
 def test_it_reads_in_a_few_lines(runs: Path, tmp_path: Path) -> None:

@@ -137,6 +137,10 @@ EVENTS = {
 """What keys sensed between frames, by name: one row an event, in the order of time."""
 
 
+class PhysicsBroke(InputError):
+    """The physics broke in an episode, after which states do not follow from actions."""
+
+
 class Recording(NamedTuple):
     """What `record` saw.
 
@@ -155,7 +159,8 @@ def play_episode(run: ExpertRun) -> Episode:
     """Have the best expert of a run play its song.
 
     Raises:
-        InputError: nothing was trained in the run, or the physics broke.
+        InputError: nothing was trained in the run.
+        PhysicsBroke: the physics broke while it was played.
     """
     # Late: other episodes need nothing of experts.
     from pianomime.learn.envs.batch import base_controller
@@ -198,8 +203,8 @@ def record(
         touch: name of the map from the speed of a key to MIDI velocity.
 
     Raises:
-        InputError: the controller gives several controls a frame, which is no action of a frame;
-            or the physics broke, after which states do not follow from actions.
+        InputError: the controller gives several controls a frame, which is no action of a frame.
+        PhysicsBroke: the physics broke while it was played.
     """
     pedal, world = score.pedal_roll(), World(world_name, quiet=True)
     columns, events = empty_columns(len(pedal)), NOTHING
@@ -225,7 +230,7 @@ def record(
         if step.frame + 1 < len(pedal):
             observe(step.frame + 1)
     if world.blow_ups:
-        raise InputError(f"the physics broke in {world.blow_ups} of {len(pedal)} frames")
+        raise PhysicsBroke(f"the physics broke in {world.blow_ups} of {len(pedal)} frames")
     return Recording(columns, qpos, event_columns(events, touch))
 
 
