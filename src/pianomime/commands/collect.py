@@ -85,7 +85,7 @@ class Collect:
                 need_demonstrations(self.demonstrations)
 
     def _episodes(self, progress: Progress) -> Generator[Episode, None, None]:
-        from pianomime.learn.data.episode import PhysicsBroke, play_episode
+        from pianomime.learn.data.episode import PhysicsError, play_episode
         from pianomime.learn.data.published import published_episodes
         from pianomime.learn.expert.expert_run import ExpertRun, find_expert_runs
 
@@ -102,7 +102,7 @@ class Collect:
             for done, folder in enumerate(found, 1):
                 try:
                     episode = play_episode(ExpertRun.load(folder))
-                except PhysicsBroke as error:
+                except PhysicsError as error:
                     warnings.warn(f"left out: {folder}: {error}", stacklevel=2)
                 else:
                     yield episode

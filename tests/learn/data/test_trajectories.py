@@ -23,7 +23,7 @@ from pianomime.learn.data.published import published_episodes, world_order
 from pianomime.learn.data.trajectories import TrajectoryData, write_trajectories
 from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert import load_expert, train_expert
-from pianomime.learn.expert.expert_run import find_expert_runs
+from pianomime.learn.expert.expert_run import ExpertRun, find_expert_runs
 from pianomime.plan.demonstration import Demonstration
 from pianomime.sealed_json import sealed
 from pianomime.world import World
@@ -73,7 +73,7 @@ def test_experts_that_broke_the_physics_are_left_out_with_a_word(
     def broken(run: ExpertRun) -> Episode:
         played.append(run)
         if len(played) == 1:
-            raise episode_module.PhysicsBroke("the physics broke in 1 of 30 frames")
+            raise episode_module.PhysicsError("the physics broke in 1 of 30 frames")
         return play(run)
 
     monkeypatch.setattr(episode_module, "play_episode", broken)

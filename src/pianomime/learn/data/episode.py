@@ -137,7 +137,7 @@ EVENTS = {
 """What keys sensed between frames, by name: one row an event, in the order of time."""
 
 
-class PhysicsBroke(InputError):
+class PhysicsError(InputError):
     """The physics broke in an episode, after which states do not follow from actions."""
 
 
@@ -160,7 +160,7 @@ def play_episode(run: ExpertRun) -> Episode:
 
     Raises:
         InputError: nothing was trained in the run.
-        PhysicsBroke: the physics broke while it was played.
+        PhysicsError: the physics broke while it was played.
     """
     # Late: other episodes need nothing of experts.
     from pianomime.learn.envs.batch import base_controller
@@ -204,7 +204,7 @@ def record(
 
     Raises:
         InputError: the controller gives several controls a frame, which is no action of a frame.
-        PhysicsBroke: the physics broke while it was played.
+        PhysicsError: the physics broke while it was played.
     """
     pedal, world = score.pedal_roll(), World(world_name, quiet=True)
     columns, events = empty_columns(len(pedal)), NOTHING
@@ -230,7 +230,7 @@ def record(
         if step.frame + 1 < len(pedal):
             observe(step.frame + 1)
     if world.blow_ups:
-        raise PhysicsBroke(f"the physics broke in {world.blow_ups} of {len(pedal)} frames")
+        raise PhysicsError(f"the physics broke in {world.blow_ups} of {len(pedal)} frames")
     return Recording(columns, qpos, event_columns(events, touch))
 
 
