@@ -107,7 +107,7 @@ def new_folder(path: Path, is_ours: Callable[[Path], bool], kind: str) -> Iterat
             there.
         OSError: it cannot be written.
     """
-    check_replaceable(path)
+    path = _place(path)
     with hold(path) as folder:
         # Not in the folder, which the next process sweeps: for a moment it is the only one.
         older = _aside(path)
@@ -125,7 +125,9 @@ def new_folder(path: Path, is_ours: Callable[[Path], bool], kind: str) -> Iterat
             except BaseException:
                 _undo(older, path)
                 raise
-        shutil.rmtree(older, ignore_errors=True)
+            if older.exists():
+                # To be removed with the folder: what stays aside would be put back.
+                os.replace(older, folder / "older")
 
 
 def put_back(path: Path) -> None:
@@ -134,16 +136,27 @@ def put_back(path: Path) -> None:
     For whoever reads what is at a place before replacing it.
 
     Args:
-        path: where the folder was, which `check_replaceable` has let pass.
+        path: where the folder was.
 
     Raises:
-        InputError: another process writes there.
+        InputError: it has no name, or another process writes there.
         OSError: it cannot be moved.
     """
+    path = _place(path)
     older = _aside(path)
     if older.exists():
         with hold(path):
             _undo(older, path)
+
+
+def _place(path: Path) -> Path:
+    """Where a folder that is replaced as a whole really is.
+
+    Raises:
+        InputError: it has no name.
+    """
+    check_replaceable(path)
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def _aside(path: Path) -> Path:

@@ -68,7 +68,7 @@ class ExportData:
         from pianomime.shown import shown
 
         if self.size is not None and self.camera is None:
-            raise InputError("--size: is that of pictures; name their camera with --camera")
+            raise InputError("--size is for pictures, which need a --camera")
         need_packages("data", PACKAGES[self.format])
         need_folder(self.out.absolute().parent)
         with extra("data"), bars() as progress, telling(progress):

@@ -115,6 +115,10 @@ class Perform:
         print(f"episodes: {done.episodes}, {done.hours:.3g} h, at a mean F1 of {done.f1:.3f}")
         for row in done.failed[:_TOLD]:
             print(f"failed: {row['song']}: {row['error']}")
+        for row in done.elsewhere[:_TOLD]:
+            print(f"not added: {row['song']}: {row['error']}")
+        if len(done.elsewhere) > _TOLD:
+            print(f"not added, in all: {len(done.elsewhere)}")
         print(f"saved: {shown(self.out)}")
         # A training keeps some songs for validation, and takes none of the split test.
         if len(training_songs(self.out)) > 1:

@@ -124,15 +124,15 @@ class Train:
         )
 
         check_sources(self.policy, self.config, self.demonstrations, self.experts)
-        need_packages("train")
-        if self.demonstrations is not None:
-            need_demonstrations(self.demonstrations)
-        need_data_sets(self.experts)
         if self.pretrained is not None and self.goal is not None:
             raise InputError(
                 "--goal and --pretrained: name one of the two, for a policy's file holds its goal "
                 "encoder"
             )
+        need_packages("train")
+        if self.demonstrations is not None:
+            need_demonstrations(self.demonstrations)
+        need_data_sets(self.experts)
         if self.pretrained is None and self.config.goal_encoding == "sdf":
             need_goal_encoder(goal, self.policy)
         need_folder(self.out)

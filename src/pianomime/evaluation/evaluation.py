@@ -352,8 +352,8 @@ class _Store:
 
 def _unwritable(name: str, reason: str) -> WorkFailed:
     return WorkFailed(
-        f"{shown(name)}: cannot be kept: {reason}; all that was finished before is, and the same "
-        "command goes on"
+        f"{shown(name)}: cannot be kept: {reason}; all songs finished before are kept, and the "
+        "same command goes on"
     )
 
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -224,6 +225,18 @@ def test_where_physics_broke_is_left_out_with_a_word(two_notes, monkeypatch):
     broken = {1}
     with pytest.warns(UserWarning, match="left out: b: cannot be recorded: it broke"):
         assert [each.name for each in collect_dagger(named, QUIET)] == ["a", "c"]
+
+    write = Path.write_bytes
+
+    def full(path, content):
+        if path.suffix == ".episode":
+            raise OSError(28, "No space left on device")
+        return write(path, content)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", full)
+        with pytest.raises(WorkFailed, match="episodes cannot be kept: No space left"):
+            list(collect_dagger(named, QUIET))
     broken = {0, 1, 2}
     with (
         pytest.warns(UserWarning, match="left out"),

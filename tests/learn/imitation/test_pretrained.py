@@ -183,9 +183,29 @@ def test_what_cannot_be_trained_further_is_refused(clips, tmp_path, capsys):
     with pytest.raises(InputError, match="another size of network"):
         load_pretrained(network, tmp_path / "nameless.onnx")
     with pytest.raises(SystemExit) as ended:
-        cli.main(
-            ["train", "low-diff", "--experts", str(tmp_path), "--pretrained", str(path)]
-            + ["--goal", str(tmp_path)]
-        )
+        cli.main(["train", "low-diff", "--experts", "x", "--pretrained", str(path), "--goal", "y"])
     assert ended.value.code == 2
-    assert capsys.readouterr().err
+    assert "--goal and --pretrained: name one of the two" in capsys.readouterr().err
+    with pytest.raises(InputError, match="would be replaced"):
+        train_policy(
+            "low-diff", config_of("low-diff"), tmp_path, None, [path], None, pretrained=path
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "less"),
+    [
+        ("low-mse", MlpConfig((32,))),
+        ("low-diff", replace(SMALL["diffusion"], condition_layers=())),
+        ("low-diff", replace(SMALL["diffusion"], skip=False)),
+    ],
+)
+def test_a_file_of_more_layers_is_refused(clips, tmp_path, name, less):
+    network, sample = a_network(clips, name, 0)
+    path = tmp_path / f"{name}.onnx"
+    export_policy(network, policy_info(network, name), path)
+    config = config_of(name)
+    shapes = {key: value.shape[1:] for key, value in sample.items()}
+    smaller = PolicyNetwork(replace(config, **{config.network: less}), shapes, network.encoder)
+    with pytest.raises(InputError, match="another size of network"):
+        load_pretrained(smaller, path)

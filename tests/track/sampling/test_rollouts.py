@@ -19,7 +19,7 @@ from pianomime.track.sampling.rollouts import Rollouts, keys_of
 from pianomime.world import World
 from pianomime.world.key_sensor import NOTHING
 from pianomime.world.layout import LAYOUT
-from pianomime.world.parameters import key_centres
+from pianomime.world.parameters import PHYSICS_DT, key_centres
 from pianomime.world.perturbation import Perturbation
 from pianomime.world.touch import TOUCHES
 
@@ -148,7 +148,9 @@ def test_one_hand_alone_is_heard_as_both_are(
             wanted, heard = sorted(whole.strikes), sorted(part.strikes)
             assert [strike.key for strike in heard] == [strike.key for strike in wanted]
             np.testing.assert_allclose(
-                [strike.time for strike in heard], [strike.time for strike in wanted], atol=2e-3
+                [strike.time for strike in heard],
+                [strike.time for strike in wanted],
+                atol=PHYSICS_DT,
             )
         assert mine.cost == pytest.approx(both.cost, abs=0.02)
     assert any(frame.strikes for frame in mine.heard)

@@ -144,7 +144,7 @@ def collect_dagger(
     Raises:
         InputError: a policy cannot be used, or no finger presses a key in a demonstration and no
             policy says where fingers go.
-        WorkFailed: no demonstration can be played.
+        WorkFailed: no demonstration can be played, or the disk for temporary files is full.
     """
     check_policies(config)
     if config.fingertip_policy is None:
@@ -167,6 +167,8 @@ def collect_dagger(
         numbers = range(len(demonstrations))
         with closing(work(_WORKER, numbers, jobs or cores(), request=request)) as recorded:
             for number, row in recorded:
+                if "unwritable" in row:
+                    raise WorkFailed(f"episodes cannot be kept: {row['unwritable']}")
                 done[number] = "error" not in row
                 if not done[number]:
                     title = demonstrations[number].score.title
@@ -188,14 +190,19 @@ def load_dagger_worker(setup: None) -> Answer:
 
     Returns:
         What reads the arguments of `collect_dagger_episode` from the file `task` of a request,
-        removes it, and writes the episode to the file `episode`.
+        removes it, and writes the episode to the file `episode`. The row is empty, or has
+        `unwritable`, the reason why the episode cannot be kept.
     """
 
     def record_episode(request: dict[str, str]) -> Row:
         task = Path(request["task"])
         episode = collect_dagger_episode(*pickle.loads(task.read_bytes()))
         task.unlink()
-        Path(request["episode"]).write_bytes(pickle.dumps(episode))
+        try:
+            Path(request["episode"]).write_bytes(pickle.dumps(episode))
+        except OSError as error:
+            # No fault of the demonstration: the next one could not be kept either.
+            return {"unwritable": error.strerror or str(error)}
         return {}
 
     return record_episode

@@ -59,8 +59,8 @@ class Performed:
         episodes: number of episodes that it holds now.
         hours: of playing that it holds [h].
         f1: mean of its episodes.
-        failed: `song` and `error` of each song that could not be played, or belongs to another
-            split already.
+        failed: `song` and `error` of each song that could not be played.
+        elsewhere: the same of each song that is there already, for another split.
     """
 
     added: int
@@ -68,6 +68,7 @@ class Performed:
     hours: float
     f1: float
     failed: list[dict[str, str]]
+    elsewhere: list[dict[str, str]]
 
 
 def perform(
@@ -173,7 +174,7 @@ def perform(
         progress("writing", 0, 0)
         result = _put_together(out, folder, older, made_by, failed, songs)
         close_parts(folder)
-    return replace(result, failed=result.failed + elsewhere)
+    return replace(result, elsewhere=elsewhere)
 
 
 def _clear(folder: Path) -> None:
@@ -220,8 +221,8 @@ def _play(
         for song, row in rows:
             if "unwritable" in row:
                 raise WorkFailed(
-                    f"{shown(song.name)}: cannot be kept: {row['unwritable']}; all that was "
-                    "finished before is, and the same command goes on"
+                    f"{shown(song.name)}: cannot be kept: {row['unwritable']}; all songs finished "
+                    "before are kept, and the same command goes on"
                 )
             if "error" in row:
                 failed.append(_failure(song, row["error"]))
@@ -250,8 +251,9 @@ def _put_together(
         try:
             part = load_part(path)
         except InputError as error:
-            # Of a song that is not named this time, or it would have been played again.
-            warnings.warn(f"{error}; left out: name its song again to have it played", stacklevel=2)
+            # Of a song that is not named this time, or that could not be played again.
+            told = "left out and removed: its song has to be played again"
+            warnings.warn(f"{error}; {told}", stacklevel=2)
             continue
         assert part.source is not None
         if part.source.digest in known:  # It was put in, and the process killed thereafter.
@@ -290,7 +292,7 @@ def _put_together(
     data = TrajectoryData.open(out)
     f1 = sum(row["f1"] for row in data.episodes) / len(data)
     hours = int(data.ends[-1]) / FRAME_RATE / _HOUR
-    return Performed(len(parts), len(data), hours, f1, failed)
+    return Performed(len(parts), len(data), hours, f1, failed, [])
 
 
 def _made_by(player: Player, source: str | Path, setup: dict[str, Any]) -> dict[str, Any]:

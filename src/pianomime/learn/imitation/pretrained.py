@@ -85,6 +85,9 @@ def load_pretrained(network: PolicyNetwork, path: Path) -> None:
         if array is None or array.size != tensor.numel():
             raise InputError(f"{path}: another size of network, or kind of goals ({name})")
         state[name] = torch.tensor(array).reshape(tensor.shape)
+    left = sorted(set(arrays) - set(state))
+    if left:
+        raise InputError(f"{path}: another size of network, or kind of goals ({left[0]})")
     network.load_state_dict(state)
 
 
@@ -98,7 +101,7 @@ def _weights(model: Any) -> dict[str, NDArray[np.float32]]:
     }
     for node in model.graph.node:
         if node.op_type == "Cast" and node.input[0] in stored:
-            stored[node.output[0]] = stored[node.input[0]]
+            stored[node.output[0]] = stored.pop(node.input[0])
     named = {
         name.removeprefix(_NAMED): array
         for name, array in stored.items()

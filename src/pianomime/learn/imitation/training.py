@@ -67,6 +67,9 @@ def train_policy(
         OSError: a file cannot be read or written.
     """
     check_sources(name, config, demonstrations, experts)
+    result = out / f"{name}.onnx"
+    if pretrained is not None and result.resolve() == pretrained.resolve():
+        raise InputError(f"{pretrained}: would be replaced; name another place for the result")
     before = None if pretrained is None else check_pretrained(config, pretrained)
     encoder = None
     if config.goal_encoding == "sdf":
@@ -109,7 +112,6 @@ def train_policy(
         held_out=validation.evenly(_VALIDATION_SAMPLES),
     )
     progress("exporting", 0, 0)
-    result = out / f"{name}.onnx"
     info = policy_info(network, name, digest)
     if before is not None:
         info = dataclasses.replace(info, licence=before.licence)
