@@ -212,7 +212,9 @@ def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_after(
     )
     assert process.returncode == 1
     (line,) = process.stderr.splitlines()
-    assert line.startswith(f"pianomime: {Path(two).name}: cannot be kept: File too large; all that")
+    assert line.startswith(
+        f"pianomime: {Path(two).name}: cannot be kept: File too large; all songs"
+    )
     assert {file: file.stat().st_mtime_ns for file in out.rglob("*.*")} == done
 
     results = evaluate([one, two], "zero-shot-ik", seconds=1.0, jobs=1, out=out)
