@@ -252,7 +252,7 @@ def test_rendering_that_fails_leaves_the_older_export(
     [
         (["--camera", "top", "--format", "minari"], "for lerobot alone", 2),
         (["--camera", "nowhere"], "nowhere", 2),
-        (["--size", "320", "136"], "name their camera with --camera", 2),
+        (["--size", "320", "136"], "which need a --camera", 2),
         (["--camera", "top", "--size", "321", "136"], "even numbers from 16 to 2048", 2),
         (["--camera", "top", "--size", "320", "4000"], "even numbers from 16 to 2048", 2),
         (["--camera", "top"], "install", 1),
