@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
 from pianomime.closing import Closing
-from pianomime.errors import InputError
+from pianomime.errors import InputError, WorkFailed
 from pianomime.shown import shown
 from pianomime.stop import Stopped, stoppable
 
@@ -45,6 +45,21 @@ _GRACE = 2.0
 """[s] for a process that is closed to clear away what it was writing."""
 _PR_SET_PDEATHSIG = 1
 """Linux: have a signal sent to this process when the thread that started it ends."""
+
+
+def unwritable(name: str, reason: str) -> WorkFailed:
+    """What ends the work on many songs when what was made of one cannot be kept.
+
+    That is no fault of the song: the next one could not be kept either.
+
+    Args:
+        name: of the song, or of the file.
+        reason: why it cannot be written.
+    """
+    return WorkFailed(
+        f"{shown(name)}: cannot be kept: {reason}; all songs finished before are kept, and the "
+        "same command goes on"
+    )
 
 
 def cores() -> int:

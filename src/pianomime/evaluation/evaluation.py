@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pianomime
-from pianomime.errors import InputError, WorkFailed
+from pianomime.errors import InputError
 from pianomime.evaluation.diagnose import CAUSES_SCHEMA
 from pianomime.evaluation.mean import mean
 from pianomime.evaluation.song_worker import SONG_WORKER, play_song, song_request
@@ -34,7 +34,7 @@ from pianomime.sealed_json import read_json, sealed, unsealed
 from pianomime.shown import shown, title_of
 from pianomime.songs.find import find_songs
 from pianomime.staging import hold, sweep
-from pianomime.workers import answered, cores, work
+from pianomime.workers import answered, cores, unwritable, work
 
 Row = dict[str, Any]
 """The numbers of one song (see `pianomime.evaluation.summary`) and its `causes` (see
@@ -186,7 +186,7 @@ def evaluate(
         with closing(playing) as played:
             for song, result in played:
                 if "unwritable" in result:
-                    raise _unwritable(song.name, result["unwritable"])
+                    raise unwritable(song.name, result["unwritable"])
                 row = {"song": title_of(song), **result}
                 if store is not None and "error" not in row:
                     row = store.put(song, row)
@@ -347,14 +347,7 @@ class _Store:
                 # it.
                 temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
         except OSError as error:
-            raise _unwritable(path.name, error.strerror or str(error)) from error
-
-
-def _unwritable(name: str, reason: str) -> WorkFailed:
-    return WorkFailed(
-        f"{shown(name)}: cannot be kept: {reason}; all songs finished before are kept, and the "
-        "same command goes on"
-    )
+            raise unwritable(path.name, error.strerror or str(error)) from error
 
 
 def _json(content: dict[str, Any]) -> str:

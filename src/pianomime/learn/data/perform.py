@@ -42,7 +42,7 @@ from pianomime.shown import shown, title_of
 from pianomime.songs.find import find_songs
 from pianomime.staging import hold
 from pianomime.validation import within
-from pianomime.workers import Row, cores, work
+from pianomime.workers import Row, cores, unwritable, work
 
 DATA_PLAYER = "zero-shot-20hz"
 """Plays one control a frame, from any state."""
@@ -220,10 +220,7 @@ def _play(
     with closing(playing) as rows:
         for song, row in rows:
             if "unwritable" in row:
-                raise WorkFailed(
-                    f"{shown(song.name)}: cannot be kept: {row['unwritable']}; all songs finished "
-                    "before are kept, and the same command goes on"
-                )
+                raise unwritable(song.name, row["unwritable"])
             if "error" in row:
                 failed.append(_failure(song, row["error"]))
             else:
