@@ -19,7 +19,7 @@ from pianomime.track.sampling.rollouts import Rollouts, keys_of
 from pianomime.world import World
 from pianomime.world.key_sensor import NOTHING
 from pianomime.world.layout import LAYOUT
-from pianomime.world.parameters import PHYSICS_DT, key_centres
+from pianomime.world.parameters import key_centres
 from pianomime.world.perturbation import Perturbation
 from pianomime.world.touch import TOUCHES
 
@@ -140,7 +140,7 @@ def test_one_hand_alone_is_heard_as_both_are(
     assert found.alone == beside * FRAMES
     before, before_alone = found.steps, found.alone
     # Where hands are together, little enough for neither to touch a key that the other one presses.
-    variations = ctrl + (1.0 if apart else 0.1) * (varied(hand, 3, apart) - ctrl)
+    variations = ctrl + (1.0 if apart else 0.05) * (varied(hand, 3, apart) - ctrl)
     for one in (ctrl, *variations):
         both, mine = found.best(start, one[None]), found.best(alone, one[None])
         for whole, part in zip(both.heard, mine.heard, strict=True):
@@ -150,7 +150,7 @@ def test_one_hand_alone_is_heard_as_both_are(
             np.testing.assert_allclose(
                 [strike.time for strike in heard],
                 [strike.time for strike in wanted],
-                atol=PHYSICS_DT,
+                atol=2e-3,
             )
         assert mine.cost == pytest.approx(both.cost, abs=0.02)
     assert any(frame.strikes for frame in mine.heard)
