@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from full_disk import line_on_full_disk
 from pianomime import Performance, evaluate, songs
 from pianomime.cli import main
 from pianomime.errors import InputError, WorkFailed
@@ -194,24 +195,14 @@ def test_a_killed_run_goes_on_where_it_was(folder: Path, tmp_path: Path) -> None
 def test_a_full_disk_ends_the_run_in_one_line_and_it_goes_on_after(
     folder: Path, tmp_path: Path
 ) -> None:
-    import resource
-
     out = tmp_path / "out"
     one, two = (str(folder / f"{name}.mid") for name in songs.names()[:2])
     evaluate(one, "zero-shot-ik", seconds=1.0, jobs=1, out=out)
     done = {file: file.stat().st_mtime_ns for file in out.rglob("*.*")}
     options = ["-o", str(out), "--player", "zero-shot-ik", "--seconds", "1", "--jobs", "1"]
-    # The system refuses files that are longer, as it does on a full disk.
-    most = 5000
-    process = subprocess.run(
-        [sys.executable, "-m", "pianomime", "evaluate", one, two, *options],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
+    line = line_on_full_disk(
+        [sys.executable, "-m", "pianomime", "evaluate", one, two, *options], 5000
     )
-    assert process.returncode == 1
-    (line,) = process.stderr.splitlines()
     assert line.startswith(
         f"pianomime: {Path(two).name}: cannot be kept: File too large; all songs"
     )

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import zarr
 
+from full_disk import line_on_full_disk
 from pianomime import Score, load_player
 from pianomime.cli import main
 from pianomime.errors import InputError, WorkFailed
@@ -357,20 +358,8 @@ def test_killed_it_goes_on_and_comes_to_the_same(
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such limits")
 def test_a_full_disk_is_one_line_and_loses_nothing(songs: Path, tmp_path: Path) -> None:
-    import resource
-
     out = tmp_path / "songs.zarr"
-    # The system refuses files that are longer, as it does on a full disk.
-    most = 20_000
-    process = subprocess.run(
-        command(songs, out),
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
-    )
-    assert process.returncode == 1
-    (line,) = process.stderr.splitlines()
+    line = line_on_full_disk(command(songs, out), 20_000)
     assert line.startswith("pianomime: one.mid: cannot be kept: File too large")
     assert [each.name for each in tmp_path.iterdir()] == ["songs"]
 
