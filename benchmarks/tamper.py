@@ -139,13 +139,13 @@ def _expert(method: str) -> Callable[[Path], None]:
 
 
 def _trajectories(path: Path) -> None:
-    from pianomime.learn.data.dagger import collect_dagger_episode
+    from pianomime.learn.data.dagger import collect_dagger_episodes
     from pianomime.learn.data.dagger_config import DaggerConfig
     from pianomime.learn.data.trajectories import write_trajectories
 
     with tempfile.TemporaryDirectory() as folder:
         shown = _with_demonstration(Path(folder, "d.npz"))
-    episodes = [collect_dagger_episode(shown, number, DaggerConfig()) for number in range(2)]
+    episodes = collect_dagger_episodes([shown] * 2, range(2), DaggerConfig())
     write_trajectories(path, iter(episodes))
 
 

@@ -45,6 +45,40 @@ class Held(NamedTuple):
     before: NDArray[np.float64]
 
 
+class OneOfBatch(WorldState):
+    """What can be read of one world of a batch, as it is at that time.
+
+    Attributes:
+        sounding: (88,) bool: keys that sound, as they sense it; a view.
+
+    Args:
+        batch: the batch.
+        index: of the world.
+    """
+
+    def __init__(self, batch: WorldBatchBase, index: int) -> None:
+        self._batch, self._index = batch, index
+        self.sounding = batch.sounding[index]
+
+    @property
+    def key_events(self) -> KeyEvents:  # type: ignore[override]  # read-only
+        """What its keys did in the last step."""
+        return self._batch.key_events.of(self._index)
+
+    @property
+    def blow_ups(self) -> int:
+        """Control steps since its last reset in which its physics became unstable."""
+        return int(self._batch.blow_ups[self._index])
+
+    def _positions(self) -> NDArray[np.float64]:
+        positions: NDArray[np.float64] = self._batch._positions()[self._index]
+        return positions
+
+    def _velocities(self) -> NDArray[np.float64]:
+        velocities: NDArray[np.float64] = self._batch._velocities()[self._index]
+        return velocities
+
+
 class WorldBatchBase(WorldState):
     """B worlds that step together.
 

@@ -45,6 +45,12 @@ class KeyEvents(NamedTuple):
         """These events, so much later [s]."""
         return self._replace(time=self.time + seconds)
 
+    def of(self, world: int) -> KeyEvents:
+        """The events of one world, as of a `World`."""
+        own = self.world == world
+        key, on, time, speed = self.key[own], self.on[own], self.time[own], self.speed[own]
+        return KeyEvents(np.zeros(len(key), np.int64), key, on, time, speed)
+
     def without(self, worlds: NDArray[np.int64]) -> KeyEvents:
         """These events but for those of some worlds, given by their indices (n,)."""
         kept = ~np.isin(self.world, worlds)

@@ -11,24 +11,35 @@ from pianomime.errors import InputError, WorkFailed
 from pianomime.learn.data import dagger
 from pianomime.learn.data.dagger import (
     collect_dagger,
-    collect_dagger_episode,
+    collect_dagger_episodes,
     songs_without_plan,
 )
 from pianomime.learn.data.dagger_config import DaggerConfig
+from pianomime.learn.data.episode import Episode
 from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.music import Score
+from pianomime.plan import ZeroShotPlanner
+from pianomime.plan.demonstration import Demonstration
 from pianomime.plan.fingertip_plan import HOVER_HEIGHT
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.methods import weights_folder
 from pianomime.track import DynamicTracker
 from pianomime.world import World
+from pianomime.world.batch_base import OneOfBatch
 from pianomime.world.hand import hand_points
 
 QUIET = DaggerConfig(noise=0.0)
 
 
+def _episode(demonstration: Demonstration, number: int, config: DaggerConfig) -> Episode:
+    """The episode of one demonstration that can be played."""
+    [made] = collect_dagger_episodes([demonstration], [number], config)
+    assert isinstance(made, Episode), made
+    return made
+
+
 def test_without_noise_the_expert_plays(two_notes):
-    episode = collect_dagger_episode(replace(two_notes, song_id=7), 0, QUIET)
+    episode = _episode(replace(two_notes, song_id=7), 0, QUIET)
     controller, world = DynamicTracker().start(make_feasible(two_notes.plan)), World()
     for frame in range(len(two_notes.plan)):
         np.testing.assert_allclose(episode.columns["joints"][frame], world.qpos_hands, atol=1e-6)
@@ -41,9 +52,7 @@ def test_without_noise_the_expert_plays(two_notes):
 
 def test_with_noise_the_labels_are_the_experts(two_notes):
     """What it would do in these states, not what was done."""
-    one, other = (
-        collect_dagger_episode(two_notes, 0, replace(QUIET, noise=noise)) for noise in (0.05, 0.3)
-    )
+    one, other = (_episode(two_notes, 0, replace(QUIET, noise=noise)) for noise in (0.05, 0.3))
     assert np.abs(one.columns["joints"] - other.columns["joints"]).max() > 0.02
     controller, world = DynamicTracker().start(make_feasible(two_notes.plan)), World()
     for frame in (5, 20):
@@ -59,6 +68,37 @@ def test_episodes_are_the_same_however_many_are_played_at_once(two_notes):
     together = [one.columns["action"] for one in collect_dagger(clips, config, jobs=2)]
     np.testing.assert_array_equal(alone, together)
     assert not np.array_equal(alone[0], alone[1])
+
+
+@pytest.mark.parametrize("rollout", [False, True])
+def test_episodes_are_the_same_however_many_share_a_batch(two_notes, rollout):
+    """Bit for bit, also beside a shorter one."""
+    score = two_notes.score.clip(0.0, 0.7)
+    short = replace(two_notes, score=score, plan=ZeroShotPlanner().plan(score))
+    clips = [two_notes, short, two_notes]
+    policy = weights_folder() / "low-diff.onnx" if rollout else None
+    config = DaggerConfig(rollout_policy=policy, worlds=1)
+    alone, pairs, together = (
+        list(collect_dagger(clips, replace(config, worlds=worlds), jobs=1)) for worlds in (1, 2, 9)
+    )
+    for one, two, three in zip(alone, pairs, together, strict=True):
+        for columns in ("columns", "events"):
+            for name, values in getattr(one, columns).items():
+                np.testing.assert_array_equal(getattr(two, columns)[name], values, err_msg=name)
+                np.testing.assert_array_equal(getattr(three, columns)[name], values, err_msg=name)
+    assert len(alone[1].columns["action"]) < len(alone[0].columns["action"])
+
+
+def test_on_another_device_it_is_nearly_the_same(two_notes):
+    pytest.importorskip("mujoco_warp", reason="the extra gpu is not installed")
+    here, there = (
+        collect_dagger_episodes([two_notes] * 2, [0, 1], replace(QUIET, device=device))
+        for device in ("cpu", "warp-cpu")
+    )
+    for one, other in zip(here, there, strict=True):
+        apart = np.abs(one.columns["joints"] - other.columns["joints"])
+        assert 0.0 < np.median(apart) < 1e-3
+        assert abs(one.f1 - other.f1) < 0.1
 
 
 @pytest.mark.parametrize(("limit", "songs"), [(2, [0, 2]), (4, [0, 1, 2, 3]), (9, [0, 1, 2, 3, 4])])
@@ -83,6 +123,8 @@ def test_the_command_plays_as_many_as_are_wanted(two_notes, tmp_path, capsys, li
         {"noise_correlation": 1.0},
         {"max_demonstrations": -1},
         {"seed": -1},
+        {"worlds": 0},
+        {"device": "gpu"},
     ],
 )
 def test_settings_out_of_range_are_refused(settings):
@@ -107,7 +149,7 @@ def test_a_fingertip_policy_and_a_rollout_policy_play(two_notes):
     config = DaggerConfig(
         rollout_policy=weights / "low-diff.onnx", fingertip_policy=weights / "high-diff.onnx"
     )
-    shown, usual = (collect_dagger_episode(two_notes, 0, one) for one in (config, QUIET))
+    shown, usual = (_episode(two_notes, 0, one) for one in (config, QUIET))
     assert not np.array_equal(shown.columns["fingertips"], usual.columns["fingertips"])
     np.testing.assert_array_equal(shown.columns["goal"], usual.columns["goal"])
     assert np.isfinite(shown.columns["action"]).all()
@@ -117,7 +159,7 @@ def test_fingertips_that_are_predicted_are_followed_where_hands_can_be(two_notes
     """What low levels observe is what the expert follows: smooth, at heights that tell presses."""
     weights = weights_folder()
     config = DaggerConfig(fingertip_policy=weights / "high-diff.onnx", noise=0.0)
-    columns = collect_dagger_episode(two_notes, 0, config).columns
+    columns = _episode(two_notes, 0, config).columns
     z = columns["fingertips"][..., 2]
     assert set(np.unique(z)) == {np.float32(0.0), np.float32(HOVER_HEIGHT)}
     np.testing.assert_array_equal(z[:, :, 1:] == 0, columns["finger_key"] >= 0)
@@ -187,7 +229,7 @@ def test_another_seed_draws_otherwise(two_notes):
     weights = weights_folder()
     config = DaggerConfig(fingertip_policy=weights / "high-diff.onnx", noise=0.0)
     one, again, other = (
-        collect_dagger_episode(two_notes, 0, replace(config, seed=seed)).columns["fingertips"]
+        _episode(two_notes, 0, replace(config, seed=seed)).columns["fingertips"]
         for seed in (1, 1, 2)
     )
     np.testing.assert_array_equal(one, again)
@@ -209,14 +251,18 @@ def test_a_rollout_policy_that_is_damaged_is_refused(two_notes, tmp_path):
 
 def test_where_physics_broke_is_left_out_with_a_word(two_notes, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(World, "blow_ups", property(lambda _: 2, lambda *_: None), raising=False)
-        with pytest.raises(InputError, match="the physics broke in 2 of "):
-            collect_dagger_episode(two_notes, 0, QUIET)
+        patch.setattr(OneOfBatch, "blow_ups", property(lambda view: 2 * (view._index == 1)))
+        kept, left_out, also = collect_dagger_episodes([two_notes] * 3, [0, 1, 2], QUIET)
+    assert isinstance(kept, Episode)
+    assert isinstance(also, Episode)
+    assert isinstance(left_out, InputError)
+    assert "the physics broke in 2 of " in str(left_out)
 
     def work(worker, numbers, jobs, request):
         answer = dagger.load_dagger_worker(None)
         for number in numbers:
-            yield number, ({"error": "it broke"} if number in broken else answer(request(number)))
+            one = number.start
+            yield number, ({"error": "it broke"} if one in broken else answer(request(number)))
 
     monkeypatch.setattr(dagger, "work", work)
     named = [

@@ -14,7 +14,9 @@ import pickle
 import warnings
 from collections.abc import Generator, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,14 +25,17 @@ from pianomime.keyboard import NO_KEY
 from pianomime.learn.data.dagger_config import DaggerConfig
 from pianomime.learn.data.episode import (
     Episode,
+    PhysicsError,
+    Recording,
     base_controls,
     fill_columns,
-    record,
+    record_together,
     song_number,
 )
 from pianomime.learn.data.noisy_controller import NoisyController, noise_spread
 from pianomime.music import Score
 from pianomime.music.excerpt import excerpt
+from pianomime.plan import FingertipPlan
 from pianomime.plan.demonstration import Demonstration
 from pianomime.plan.hand_path import make_feasible
 from pianomime.policies.finger_assignment import flat_plan
@@ -40,9 +45,11 @@ from pianomime.policies.network_file import load_policy
 from pianomime.policies.policy_tracker import PolicyController
 from pianomime.policies.predicted_plan import predicted_plan
 from pianomime.policies.sampler import Sampler
+from pianomime.shown import shown
 from pianomime.staging import scratch
 from pianomime.track import DynamicTracker, IkTracker
 from pianomime.workers import Answer, Row, cores, work
+from pianomime.world.device_batch import check_device, device_batch
 
 _WORKER = "pianomime.learn.data.dagger:load_dagger_worker"
 
@@ -50,10 +57,25 @@ _FAST = Sampler(steps=2)
 """Sampling of the policies that play: there are many frames, and rough actions will do."""
 
 
-def collect_dagger_episode(
-    demonstration: Demonstration, number: int, config: DaggerConfig
-) -> Episode:
-    """Play a demonstration and record the expert's controls as `action`.
+@dataclass(frozen=True, eq=False)
+class _Take:
+    """A demonstration that is ready to be played.
+
+    Attributes:
+        demonstration: what is played.
+        plan: the fingertips that low levels are to reach, at heights that tell alone which press.
+        controller: plays, and keeps what the expert would do.
+    """
+
+    demonstration: Demonstration
+    plan: FingertipPlan
+    controller: NoisyController
+
+
+def collect_dagger_episodes(
+    demonstrations: Sequence[Demonstration], numbers: Sequence[int], config: DaggerConfig
+) -> list[Episode | InputError]:
+    """Play demonstrations side by side, and record the expert's controls as `action`.
 
     The expert is the dynamic tracker. The fingertips, the demonstration's or those that a
     high-level policy predicts, are first made feasible for the robot's hands (`make_feasible`):
@@ -61,18 +83,43 @@ def collect_dagger_episode(
     heights that tell alone which press (`flat_heights`).
 
     Args:
-        demonstration: what to play.
-        number: of the demonstration, which seeds its randomness together with the config's seed.
-        config: which policies play, and the noise.
+        demonstrations: what to play.
+        numbers: of the demonstrations; each seeds its randomness together with the config's seed.
+        config: which policies play, the noise, and what steps the worlds. On "cpu" an episode is
+            the same bit for bit, whatever is played beside it.
+
+    Returns:
+        Of each demonstration its episode, or why there is none: a policy cannot be read, or the
+        physics broke.
 
     Raises:
-        InputError: a policy cannot be read, or the physics broke.
+        InputError: the config's device cannot be used here.
     """
+    made: list[Episode | InputError | None] = [None] * len(demonstrations)
+    takes: dict[int, _Take] = {}
+    for index, (demonstration, number) in enumerate(zip(demonstrations, numbers, strict=True)):
+        try:
+            takes[index] = _take(demonstration, number, config)
+        except InputError as error:
+            made[index] = error
+    if takes:
+        controllers = [take.controller for take in takes.values()]
+        scores = [take.demonstration.score for take in takes.values()]
+        worlds = device_batch(len(takes), config.device, threads=1, quiet=True)
+        recordings = record_together(controllers, scores, worlds)
+        for index, recording in zip(takes, recordings, strict=True):
+            if isinstance(recording, PhysicsError):
+                made[index] = recording
+            else:
+                made[index] = _episode(takes[index], recording)
+    return [each for each in made if each is not None]
+
+
+def _take(demonstration: Demonstration, number: int, config: DaggerConfig) -> _Take:
     rng = np.random.default_rng([config.seed, number])
     spread = noise_spread(config.noise * rng.random())
     seeds = rng.integers(2**31, size=2).tolist()
-    score = demonstration.score
-    plan = demonstration.plan
+    score, plan = demonstration.score, demonstration.plan
     if config.fingertip_policy is not None:
         plan = predicted_plan(score, load_policy(config.fingertip_policy, _FAST), seeds[1])
     feasible = make_feasible(plan)
@@ -83,10 +130,16 @@ def collect_dagger_episode(
         played = PolicyController(plan, tracker, score.roll())
     expert = DynamicTracker().start(feasible)
     controller = NoisyController(expert, played, spread, config.noise_correlation, rng)
-    columns, qpos, events = record(controller, score)
-    columns["action"][:] = controller.labels
-    base = base_controls(IkTracker().start(plan), qpos)
+    return _Take(demonstration, plan, controller)
+
+
+def _episode(take: _Take, recording: Recording) -> Episode:
+    demonstration, plan = take.demonstration, take.plan
+    score, columns = demonstration.score, recording.columns
+    columns["action"][:] = take.controller.labels
+    base = base_controls(IkTracker().start(plan), recording.qpos)
     f1 = fill_columns(columns, base, score.roll(), plan.fingertips, plan.finger_key)
+    events = recording.events
     return Episode(score.title, f1, "ik", columns, demonstration.song_id, events=events)
 
 
@@ -138,71 +191,88 @@ def collect_dagger(
 
     Args:
         demonstrations: what to play.
-        config: which policies play, and the noise.
+        config: which policies play, the noise, and what steps the worlds.
         jobs: processes; one a core if None.
 
     Raises:
-        InputError: a policy cannot be used, or no finger presses a key in a demonstration and no
-            policy says where fingers go.
+        InputError: a policy or the device cannot be used, or no finger presses a key in a
+            demonstration and no policy says where fingers go.
         WorkFailed: no demonstration can be played, or the disk for temporary files is full.
     """
     check_policies(config)
+    check_device(config.device)
     if config.fingertip_policy is None:
         for demonstration in demonstrations:
             if (demonstration.plan.finger_key == NO_KEY).all():
                 title = demonstration.score.title
                 raise InputError(f"{title}: no finger presses a key; give a fingertip policy")
+    groups = _groups(len(demonstrations), config.worlds)
     # Episodes are large, and pass through files. Nobody else can write into this folder.
     with scratch() as folder:
 
-        def request(number: int) -> dict[str, str]:
-            names = {name: str(Path(folder, f"{number}.{name}")) for name in ("task", "episode")}
-            task = demonstrations[number], number, config
-            Path(names["task"]).write_bytes(pickle.dumps(task))
-            return names
+        def request(group: range) -> dict[str, Any]:
+            task = Path(folder, f"{group.start}.task")
+            some = demonstrations[group.start : group.stop]
+            task.write_bytes(pickle.dumps((some, list(group), config)))
+            return {"task": str(task), "episodes": [str(_file(folder, each)) for each in group]}
 
         # Whether each could be played.
         done: dict[int, bool] = {}
         turn = 0
-        numbers = range(len(demonstrations))
-        with closing(work(_WORKER, numbers, jobs or cores(), request=request)) as recorded:
-            for number, row in recorded:
+        with closing(work(_WORKER, groups, jobs or cores(), request=request)) as recorded:
+            for group, row in recorded:
                 if "unwritable" in row:
                     raise WorkFailed(f"episodes cannot be kept: {row['unwritable']}")
-                done[number] = "error" not in row
-                if not done[number]:
-                    title = demonstrations[number].score.title
-                    told = f"{title}: cannot be recorded: {row['error']}"
-                    if len(done) == len(demonstrations) and not any(done.values()):
-                        raise WorkFailed(told)
-                    warnings.warn(f"left out: {told}", stacklevel=2)
+                reasons = row["errors"] if "errors" in row else [row["error"]] * len(group)
+                for number, reason in zip(group, reasons, strict=True):
+                    done[number] = reason is None
+                    if reason is not None:
+                        title = demonstrations[number].score.title
+                        told = f"{title}: cannot be recorded: {reason}"
+                        if len(done) == len(demonstrations) and not any(done.values()):
+                            raise WorkFailed(told)
+                        warnings.warn(f"left out: {told}", stacklevel=2)
                 while turn in done:
                     if done[turn]:
-                        path = Path(folder, f"{turn}.episode")
+                        path = _file(folder, turn)
                         episode: Episode = pickle.loads(path.read_bytes())
                         path.unlink()
                         yield episode
                     turn += 1
 
 
+def _groups(number: int, most: int) -> list[range]:
+    """Demonstrations that are played side by side, by their numbers in order."""
+    return [range(first, min(first + most, number)) for first in range(0, number, most)]
+
+
+def _file(folder: Path, number: int) -> Path:
+    """Where the episode of a demonstration is handed over."""
+    return folder / f"{number}.episode"
+
+
 def load_dagger_worker(setup: None) -> Answer:
     """What `collect_dagger` has its worker processes do, which needs no setup.
 
     Returns:
-        What reads the arguments of `collect_dagger_episode` from the file `task` of a request,
-        removes it, and writes the episode to the file `episode`. The row is empty, or has
-        `unwritable`, the reason why the episode cannot be kept.
+        What reads the arguments of `collect_dagger_episodes` from the file `task` of a request,
+        removes it, and writes each episode to its file in `episodes`. The row has `errors`: of
+        each why there is none, or None. Or it has `unwritable`, the reason why an episode cannot
+        be kept.
     """
 
-    def record_episode(request: dict[str, str]) -> Row:
+    def record_episodes(request: dict[str, Any]) -> Row:
         task = Path(request["task"])
-        episode = collect_dagger_episode(*pickle.loads(task.read_bytes()))
+        made = collect_dagger_episodes(*pickle.loads(task.read_bytes()))
         task.unlink()
         try:
-            Path(request["episode"]).write_bytes(pickle.dumps(episode))
+            for episode, path in zip(made, request["episodes"], strict=True):
+                if isinstance(episode, Episode):
+                    Path(path).write_bytes(pickle.dumps(episode))
         except OSError as error:
             # No fault of the demonstration: the next one could not be kept either.
             return {"unwritable": error.strerror or str(error)}
-        return {}
+        errors = [shown(each) if isinstance(each, InputError) else None for each in made]
+        return {"errors": errors}
 
-    return record_episode
+    return record_episodes

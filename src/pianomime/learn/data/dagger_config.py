@@ -8,7 +8,8 @@ from typing import Annotated
 
 import tyro
 
-from pianomime.validation import whole_numbers, within
+from pianomime.device_names import CPU, DEVICES, DeviceName
+from pianomime.validation import one_of, whole_numbers, within
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,10 @@ class DaggerConfig:
     given."""
     max_demonstrations: int = 0
     """Number of demonstrations to play, evenly spread over all; 0 for all."""
+    worlds: int = 1
+    """Demonstrations that a process plays side by side, in one batch of worlds."""
+    device: DeviceName = CPU
+    """What steps the worlds: the cores, or a GPU of NVIDIA (the extra gpu), which wants many."""
     seed: int = 0
     """Seed of the noise and of the policies' sampling."""
 
@@ -38,5 +43,7 @@ class DaggerConfig:
         whole_numbers(self)
         within("noise", self.noise, 0, 1)
         within("noise_correlation", self.noise_correlation, 0, 0.99)
+        within("worlds", self.worlds, 1)
+        one_of("device", self.device, DEVICES)
         for name in ("max_demonstrations", "seed"):
             within(name, getattr(self, name), 0)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.music import Score, frame_metrics
-from pianomime.players.rollout import rollout
+from pianomime.players.rollout import Step, rollout
 from pianomime.short_repr import short_repr
 from pianomime.track import BatchController, Controller
 from pianomime.world import World
+from pianomime.world.batch_base import OneOfBatch, WorldBatchBase
 from pianomime.world.key_sensor import NOTHING, KeyEvents
 from pianomime.world.layout import FINGER_COUNT, LAYOUT, POINT_COUNT
 from pianomime.world.touch import DEFAULT_TOUCH, TOUCHES
@@ -142,7 +144,7 @@ class PhysicsError(InputError):
 
 
 class Recording(NamedTuple):
-    """What `record` saw.
+    """What `record` saw, or of one song `record_together`.
 
     Attributes:
         columns: of T frames; those that `fill_columns` fills are not filled yet.
@@ -207,16 +209,7 @@ def record(
         PhysicsError: the physics broke while it was played.
     """
     pedal, world = score.pedal_roll(), World(world_name, quiet=True)
-    columns, events = empty_columns(len(pedal)), NOTHING
-    qpos = np.empty((len(pedal), LAYOUT.qpos_size))
-
-    def observe(frame: int) -> None:
-        qpos[frame] = world.qpos
-        columns["joints"][frame] = world.qpos_hands
-        columns["velocities"][frame] = world.qvel_hands
-        columns["keys"][frame] = world.key_state
-
-    observe(0)
+    recorder = _Recorder(len(pedal), world)
     for step in rollout(controller, world, pedal):
         controls = len(np.atleast_2d(step.ctrl))
         if controls > 1:
@@ -224,14 +217,83 @@ def record(
                 f"a data set has one control a frame, not {controls}: collect from a player of "
                 "frames, such as zero-shot-20hz"
             )
-        columns["action"][step.frame] = step.ctrl
-        columns["pressed"][step.frame] = world.pressed
-        events = events.followed_by(step.key_events.later(step.frame * FRAME_SECONDS))
-        if step.frame + 1 < len(pedal):
-            observe(step.frame + 1)
-    if world.blow_ups:
-        raise PhysicsError(f"the physics broke in {world.blow_ups} of {len(pedal)} frames")
-    return Recording(columns, qpos, event_columns(events, touch))
+        recorder.record(step)
+    return recorder.recording(touch)
+
+
+def record_together(
+    controllers: Sequence[Controller], scores: Sequence[Score], worlds: WorldBatchBase
+) -> list[Recording | PhysicsError]:
+    """Play songs side by side, each in a world of its own, and record what `record` does.
+
+    Args:
+        controllers: play; they give one control a frame, and read of their world what a
+            `WorldState` has.
+        scores: what is played, one for each controller.
+        worlds: as many, at rest.
+
+    Returns:
+        Of each song the recording, or that its physics broke.
+    """
+    views = [OneOfBatch(worlds, index) for index in range(len(worlds))]
+    pedals = [score.pedal_roll() for score in scores]
+    recorders = [_Recorder(len(pedal), view) for pedal, view in zip(pedals, views, strict=True)]
+    for frame in range(max(map(len, pedals))):
+        ids = [index for index, pedal in enumerate(pedals) if frame < len(pedal)]
+        # A view is no World, but has all that these controllers read.
+        ctrl = [controllers[each].control(frame, cast(World, views[each])) for each in ids]
+        pedal = [bool(pedals[each][frame]) for each in ids]
+        worlds.step(np.array(ctrl), pedal, ids)
+        for each, sent, down in zip(ids, ctrl, pedal, strict=True):
+            recorders[each].record(Step(frame, sent, down, views[each].key_events))
+    ended: list[Recording | PhysicsError] = []
+    for recorder in recorders:
+        try:
+            ended.append(recorder.recording(DEFAULT_TOUCH))
+        except PhysicsError as error:
+            ended.append(error)
+    return ended
+
+
+class _Recorder:
+    """Records one song frame by frame, from the state before the first.
+
+    Args:
+        frames: of the song.
+        world: where it is played.
+    """
+
+    def __init__(self, frames: int, world: World | OneOfBatch) -> None:
+        self._world, self._frames = world, frames
+        self._columns, self._events = empty_columns(frames), NOTHING
+        self._qpos = np.empty((frames, LAYOUT.qpos_size))
+        self._observe(0)
+
+    def record(self, step: Step) -> None:
+        """Record a frame, after which the world is as it is now."""
+        self._columns["action"][step.frame] = step.ctrl
+        self._columns["pressed"][step.frame] = self._world.pressed
+        events = step.key_events.later(step.frame * FRAME_SECONDS)
+        self._events = self._events.followed_by(events)
+        if step.frame + 1 < self._frames:
+            self._observe(step.frame + 1)
+
+    def recording(self, touch: str) -> Recording:
+        """All of it.
+
+        Raises:
+            PhysicsError: the physics broke.
+        """
+        broken = self._world.blow_ups
+        if broken:
+            raise PhysicsError(f"the physics broke in {broken} of {self._frames} frames")
+        return Recording(self._columns, self._qpos, event_columns(self._events, touch))
+
+    def _observe(self, frame: int) -> None:
+        self._qpos[frame] = self._world.qpos
+        self._columns["joints"][frame] = self._world.qpos_hands
+        self._columns["velocities"][frame] = self._world.qvel_hands
+        self._columns["keys"][frame] = self._world.key_state
 
 
 def base_controls(base: BatchController, qpos: NDArray[np.float64]) -> NDArray[np.float64]:
