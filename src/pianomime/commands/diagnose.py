@@ -25,8 +25,8 @@ class Diagnose:
     Several performances are summed.
 
     Examples:
-      pianomime diagnose out/fur-elise/performance.npz
-      pianomime diagnose out/fur-elise/performance.npz -o out/why
+      pianomime diagnose out/SONG/performance.npz
+      pianomime diagnose out/SONG/performance.npz -o out/why
       pianomime diagnose out/*/performance.npz -o out/why
     """
 
@@ -34,7 +34,7 @@ class Diagnose:
         tyro.conf.Positional[tuple[Path, ...]],
         tyro.conf.arg(metavar="PERFORMANCE.npz...", help_behavior_hint="(required)"),
     ]
-    """Performances that `pianomime play` (performance.npz) or `pianomime evaluate` (songs/SONG.npz)
+    """Performances that `pianomime play` (performance.npz) or `pianomime evaluate` (songs/SONG-*.npz)
     has written."""
     out: Annotated[
         Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")

@@ -27,9 +27,9 @@ class Export:
     as it was played in (MJCF, URDF). The performance is played again for it.
 
     Examples:
-      pianomime export out/fur-elise/performance.npz
-      pianomime export out/fur-elise/performance.npz --rate 500 -o out/robot
-      pianomime export out/fur-elise/performance.npz --limits ROBOT.csv --strict
+      pianomime export out/SONG/performance.npz
+      pianomime export out/SONG/performance.npz --rate 500 -o out/robot
+      pianomime export out/SONG/performance.npz --limits ROBOT.csv --strict
     """
 
     performance: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PERFORMANCE.npz")]

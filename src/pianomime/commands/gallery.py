@@ -18,9 +18,9 @@ class Gallery:
     where it was stopped, and makes only pages that are not there.
 
     Examples:
-      pianomime gallery out/fur-elise out/bach -o site
+      pianomime gallery out/SONG out/OTHER -o site
       pianomime gallery out/all -o site --title "Etude-12, effort 1"
-      pianomime gallery out/all/songs/SONG.npz -o site
+      pianomime gallery out/all/songs/SONG-*.npz -o site
     """
 
     results: Annotated[

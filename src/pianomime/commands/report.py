@@ -27,9 +27,9 @@ class Report:
     metrics (report.json), the performance (performance.npz), and MIDI, WAV and pictures.
 
     Examples:
-      pianomime report out/fur-elise/performance.npz
-      pianomime report out/fur-elise/performance.npz -o out/shown --video
-      pianomime report out/all/songs/SONG.npz
+      pianomime report out/SONG/performance.npz
+      pianomime report out/SONG/performance.npz -o out/shown --video
+      pianomime report out/all/songs/SONG-*.npz
     """
 
     performance: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="PERFORMANCE.npz")]

@@ -22,7 +22,7 @@ class ScorePlaying:
     or person has made. It is compared in true time, and no lag is taken off.
 
     Examples:
-      pianomime score out/fur-elise/performance.npz
+      pianomime score out/SONG/performance.npz
       pianomime score PLAYED.mid --against SONG.mid
       pianomime score performance.mid --against SONG.mid --lead-in 0.5
       pianomime score PLAYED.mid --against SONG.mid --no-trim --seconds inf --json

@@ -20,7 +20,7 @@ class StageCommand:
     Examples:
       pianomime stage
       pianomime stage SONG.mid FOLDER
-      pianomime stage out/fur-elise out/all
+      pianomime stage out/SONG out/all
       pianomime stage --port 8080 --no-browser
     """
 
