@@ -95,6 +95,12 @@ def test_a_pool_gives_each_item_its_row() -> None:
     assert list(work(THIS, [], 3)) == []
 
 
+@pytest.mark.parametrize("jobs", [0, -1])
+def test_a_pool_of_no_processes_is_refused(jobs: int) -> None:
+    with pytest.raises(InputError, match="jobs must be 1 or more"):
+        list(work(THIS, [1], jobs))
+
+
 def test_requests_are_made_when_their_turn_comes() -> None:
     made: list[int] = []
 

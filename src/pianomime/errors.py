@@ -29,7 +29,7 @@ class WorkFailed(RuntimeError):  # noqa: N818 - an outcome of the work, not a mi
 
 
 class TrainingDiverged(WorkFailed):
-    """The loss of a training is not a finite number any more."""
+    """The loss of a training, or what its policy gives, is not a finite number any more."""
 
 
 class UnknownNameError(InputError):

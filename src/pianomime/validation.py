@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _MOST_LAYERS, _WIDEST = 8, 8192
 """Of a network: what a damaged file asks for must not fill the memory."""
+_LARGEST_SEED = 2**32 - 1
+"""What NumPy and Stable-Baselines3 take."""
 _ROUNDING = 1e-6
 """Share of a unit by which its multiple may be off, as 3 * 0.005 is from 0.015."""
 
@@ -31,6 +33,19 @@ def within(name: str, value: float, least: float, most: float = math.inf) -> Non
     if not (least <= value <= most and math.isfinite(value)):
         wanted = f"{least:g} or more" if most == math.inf else f"{least:g} to {most:g}"
         raise InputError(f"{name.replace('_', '-')} must be {wanted}, not {value:g}")
+
+
+def check_seed(name: str, seed: int) -> None:
+    """Refuse a seed that not every generator of random numbers takes.
+
+    Raises:
+        InputError: it is negative or of more than 32 bits; the message names it as the command line
+            does.
+    """
+    if not isinstance(seed, int):
+        raise InputError(f"{name.replace('_', '-')} must be a whole number, not {seed!r}")
+    if not 0 <= seed <= _LARGEST_SEED:
+        raise InputError(f"{name.replace('_', '-')} must be 0 to {_LARGEST_SEED}, not {seed}")
 
 
 def above_zero(name: str, value: float) -> None:

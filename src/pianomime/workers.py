@@ -72,7 +72,7 @@ def cores() -> int:
 def work(
     function: str,
     items: Iterable[_Item],
-    jobs: int,
+    jobs: int | None,
     setup: Any = None,
     request: Callable[[_Item], Any] = lambda item: item,
 ) -> Generator[tuple[_Item, Row], None, None]:
@@ -83,11 +83,17 @@ def work(
     Args:
         function: what loads what answers, as "package.module:function".
         items: what is to be done.
-        jobs: processes at most.
+        jobs: processes at most; one a core that this one may use if None.
         setup: what the function is given, for JSON.
         request: the request of an item, for JSON; called in this process just before the item is
             worked on.
+
+    Raises:
+        InputError: there is less than one process.
     """
+    jobs = cores() if jobs is None else jobs
+    if jobs < 1:
+        raise InputError(f"jobs must be 1 or more, not {jobs}")
     waiting = deque(items)
     workers = [Worker(function, setup) for _ in range(min(jobs, len(waiting)))]
     if not workers:

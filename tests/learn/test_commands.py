@@ -143,6 +143,11 @@ MISSING: list[tuple[list[str], str]] = [
     (["train", "bc-mse", "--experts", "file"], "`pianomime collect-dagger"),
     (["train", "high-diff", "--demonstrations", "no"], "does not exist; `pianomime import-d"),
     (["train", "high-diff", "--demonstrations", "empty"], "`pianomime import-demos`"),
+    (["train-stage", "fingering", "--experts"], "no data sets are named; "),
+    (["train", "high-diff-no-sdf", "--experts", "x", "--goal", "y"], "needs no goal encoder"),
+    (["collect", "run", "--demonstrations", "x.npz"], "--demonstrations: runs hold theirs"),
+    (["train-sac", "x", "--seed", "4294967296"], "seed must be 0 to 4294967295"),
+    (["train", "high-bet", "--experts", "x", "--bet.bins", "100000"], "bet.bins must be 2 to 1024"),
     (["train", "high-diff", "--demonstrations", "file"], "`pianomime import-demos`"),
     (["train", "low-mse", "--demonstrations", "demo.npz"], "`pianomime collect-dagger`"),
     (

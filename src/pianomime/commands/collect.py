@@ -73,6 +73,10 @@ class Collect:
 
         if not self.runs:
             raise InputError("no runs to collect: name run folders of experts")
+        if self.demonstrations is not None and not any(run.suffix == ".npz" for run in self.runs):
+            raise InputError(
+                "--demonstrations: runs hold theirs; they are for published experts (.npz) alone"
+            )
         need_packages("train")
         need_place_for_data_set(self.out)
         for path in self.runs:

@@ -98,11 +98,12 @@ class CollectDagger:
 
     def _songs(self) -> list[Path]:
         """The MIDI files whose fingertips are to be predicted; none if there are demonstrations."""
+        from pianomime.commands.needs import holds_demonstrations
         from pianomime.errors import InputError
         from pianomime.songs.find import MIDI_SUFFIXES, files_below
 
         source, songs = self.demonstrations, list[Path]()
-        if source.is_dir() and next(source.rglob("*.npz"), None) is None:
+        if source.is_dir() and not holds_demonstrations(source):
             with suppress(InputError):
                 songs = files_below(source, MIDI_SUFFIXES, "MIDI files")
         elif source.suffix.lower() in MIDI_SUFFIXES and source.is_file():

@@ -34,8 +34,8 @@ class Diagnose:
         tyro.conf.Positional[tuple[Path, ...]],
         tyro.conf.arg(metavar="PERFORMANCE.npz...", help_behavior_hint="(required)"),
     ]
-    """Performances that `pianomime play` (performance.npz) or `pianomime evaluate` (songs/SONG-*.npz)
-    has written."""
+    """Performances that `pianomime play` (performance.npz) or `pianomime evaluate`
+    (songs/SONG-*.npz) has written."""
     out: Annotated[
         Path | None, tyro.conf.arg(aliases=["-o"], metavar="OUT", help_behavior_hint="")
     ] = None

@@ -46,7 +46,6 @@ class Gallery:
         from pianomime.errors import InputError
         from pianomime.report.gallery import INDEX, performances_of, write_gallery
         from pianomime.shown import shown
-        from pianomime.workers import cores
 
         if not self.results:
             raise InputError("no results to show")
@@ -59,7 +58,7 @@ class Gallery:
                 performances,
                 self.out,
                 self.title,
-                self.jobs or cores(),
+                self.jobs,
                 progress,
                 notes.append,
             )

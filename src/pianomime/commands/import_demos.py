@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -64,4 +65,13 @@ class ImportDemos:
                 demonstration.save(folder / f"{file_name(demonstration.score.title)}.npz")
                 number += 1
                 progress("importing", number, total)
+            # Not what macOS writes beside files.
+            there = {path.name for path in out.glob("[!.]*.npz")}
+            others = there - {path.name for path in folder.iterdir()}
+        if others:
+            warnings.warn(
+                f"{out}: holds {len(others)} more .npz files, which were there before; what learns "
+                "from the folder learns from them, too",
+                stacklevel=2,
+            )
         print(f"saved {number} demonstrations: {shown(out)}")

@@ -144,7 +144,7 @@ def need_demonstrations(source: Path) -> None:
     if not source.exists():
         raise InputError(f"{source}: does not exist; {_MAKES_DEMOS}")
     if source.is_dir():
-        if next(source.rglob("*.npz"), None) is None:
+        if not holds_demonstrations(source):
             if zarr_attributes(source) is not None or next(source.rglob(".zgroup"), None):
                 raise InputError(
                     f"{source}: is a zarr data set, not a folder of demonstrations; if it is the "
@@ -153,6 +153,18 @@ def need_demonstrations(source: Path) -> None:
             raise InputError(f"{source}: holds no demonstrations (.npz); {_MAKES_DEMOS}")
     elif not zipfile.is_zipfile(source):
         raise InputError(f"{source}: not a file of demonstrations (.npz); {_MAKES_DEMOS}")
+
+
+def holds_demonstrations(folder: Path) -> bool:
+    """Whether there are files such as those of demonstrations in a folder or below it."""
+    from pianomime.songs.find import files_below
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # They are told where the files are read.
+        try:
+            return bool(files_below(folder, (".npz",), "demonstrations"))
+        except InputError:
+            return False
 
 
 def need_experts(path: Path) -> None:
@@ -180,6 +192,8 @@ def need_data_sets(paths: Sequence[Path]) -> None:
         InputError: one is not there, or something else, and the message says what makes it; or
             there is but one song in them, and nothing to validate on.
     """
+    if not paths:
+        raise InputError(f"no data sets are named; {_MAKES_DATA}")
     for path in paths:
         _need_data_set(path)
     songs = {key: name for path in paths for key, name in training_songs(path).items()}

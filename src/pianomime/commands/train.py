@@ -129,10 +129,13 @@ class Train:
                 "--goal and --pretrained: name one of the two, for a policy's file holds its goal "
                 "encoder"
             )
+        if self.goal is not None and self.config.goal_encoding != "sdf":
+            raise InputError(f"--goal: {self.policy} needs no goal encoder")
         need_packages("train")
         if self.demonstrations is not None:
             need_demonstrations(self.demonstrations)
-        need_data_sets(self.experts)
+        if self.experts:
+            need_data_sets(self.experts)
         if self.pretrained is None and self.config.goal_encoding == "sdf":
             need_goal_encoder(goal, self.policy)
         need_folder(self.out)

@@ -34,7 +34,7 @@ from pianomime.sealed_json import read_json, sealed, unsealed
 from pianomime.shown import shown, title_of
 from pianomime.songs.find import find_songs
 from pianomime.staging import hold, sweep
-from pianomime.workers import answered, cores, unwritable, work
+from pianomime.workers import answered, unwritable, work
 
 Row = dict[str, Any]
 """The numbers of one song (see `pianomime.evaluation.summary`) and its `causes` (see
@@ -178,7 +178,7 @@ def evaluate(
                 "lead_in": lead_in,
             }
             if ray is None:
-                playing = work(SONG_WORKER, waiting, jobs or cores(), setup, request)
+                playing = work(SONG_WORKER, waiting, jobs, setup, request)
             else:
                 from pianomime.ray_cluster import on_cluster
 

@@ -24,7 +24,7 @@ from pianomime.progress import Progress, no_progress
 from pianomime.sealed_json import read_json, sealed, unsealed
 from pianomime.shown import markdown_cell
 from pianomime.staging import hold, sweep
-from pianomime.workers import cores, work
+from pianomime.workers import work
 
 Row = dict[str, Any]
 _SCORES = {"f1": "frame F1", "note_f1_50": "note F1, 50 ms"}
@@ -90,7 +90,7 @@ def robustness(
         def request(item: tuple[int, str, Path, Path]) -> dict[str, str]:
             return {"song": item[1], "performance": str(item[2])}
 
-        with closing(work(ROBUST_WORKER, waiting, jobs or cores(), None, request)) as done:
+        with closing(work(ROBUST_WORKER, waiting, jobs, None, request)) as done:
             for (number, song, _, file), row in done:
                 if "error" not in row:
                     _write(file, _json(sealed(row, file.name)))

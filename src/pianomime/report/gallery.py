@@ -139,7 +139,7 @@ def write_gallery(
     performances: Sequence[Path],
     site: Path,
     title: str,
-    jobs: int,
+    jobs: int | None,
     progress: Progress = no_progress,
     note: Callable[[str], None] = print,
 ) -> list[Row]:
@@ -152,7 +152,7 @@ def write_gallery(
         performances: files of performances, each once.
         site: folder of the site; made if it is not there.
         title: heading of the index.
-        jobs: how many pages are made at a time.
+        jobs: how many pages are made at a time; one a core if None.
         progress: called after every page, in the phase "pages".
         note: called with one line for each performance that could not be shown, and once if pages
             lack their hands.

@@ -461,6 +461,33 @@ def test_a_damaged_part_of_a_song_that_is_not_named_is_left_out(
     assert set(digests(out)) == {"one", "two"}
 
 
+def test_a_song_that_was_renamed_meanwhile_is_in_it_once(
+    songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "songs.zarr"
+
+    def killed(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(factory, "write_trajectories", killed)
+        with pytest.raises(WorkFailed):
+            made(songs, out)
+    (songs / "one.mid").rename(songs / "first.mid")
+    result = made(songs, out)
+    assert (result.added, result.episodes) == (2, 2)
+    assert set(digests(out)) == {"one", "two"}
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32, 2**64])
+def test_a_seed_that_cannot_be_kept_is_refused_at_once(
+    songs: Path, tmp_path: Path, seed: int
+) -> None:
+    with pytest.raises(InputError, match="seed must be 0 to 4294967295"):
+        made(songs, tmp_path / "songs.zarr", seed=seed)
+    assert not (tmp_path / "songs.zarr.parts").exists()
+
+
 def test_a_damaged_data_set_costs_nothing_of_what_is_played(songs: Path, tmp_path: Path) -> None:
     out = tmp_path / "songs.zarr"
     made([songs / "one.mid"], out)

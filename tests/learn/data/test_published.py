@@ -103,6 +103,24 @@ def test_what_is_not_for_training_is_left_out_of_it(four_clips, tmp_path):
         assert titles == ["clips-000", "clips-001"]
 
 
+def test_what_is_no_demonstration_of_a_folder_is_not_read(four_clips, tmp_path, capsys):
+    """What a killed process or macOS left; of clips of another import a line tells."""
+    pytest.importorskip("zarr")
+    from pianomime.learn.data.dataset import read_demonstrations
+
+    demos = tmp_path / "demos"
+    cli.main(["import-demos", str(four_clips), "-o", str(demos)])
+    left = demos / ".pianomime-0123456789abcdef" / "out"
+    left.mkdir(parents=True)
+    one = (demos / "clips-000.npz").read_bytes()
+    (left / "clips-000.npz").write_bytes(one)
+    (demos / "._clips-000.npz").write_bytes(b"of a Mac")
+    assert len(read_demonstrations(demos)) == 2
+    capsys.readouterr()
+    cli.main(["import-demos", str(four_clips), "-o", str(demos), "--clips", "1"])
+    assert "holds 3 more .npz files, which were there before" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import errno
 import json
 import os
 import subprocess
@@ -16,9 +17,11 @@ from typing import Any
 import pytest
 
 from pianomime import staging
-from pianomime.errors import InputError
+from pianomime.errors import InputError, WorkFailed
+from pianomime.learn.expert import expert_worker, many
 from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert_run import ExpertRun
+from pianomime.learn.expert.expert_worker import expert_request
 from pianomime.learn.expert.many import experts_table, find_experts_songs, train_experts
 from pianomime.learn.runs.config_json import to_json
 from pianomime.plan.demonstration import Demonstration
@@ -82,6 +85,38 @@ def test_bad_input(tmp_path: Path, small_search: ExpertConfig) -> None:
         train_experts(tmp_path / "none", tmp_path / "out", small_search)
     with pytest.raises(InputError, match="no demonstrations"):
         train_experts(tmp_path, tmp_path / "out", small_search)
+
+
+def test_where_no_song_can_be_trained_results_stay(
+    songs: Path, tmp_path: Path, small_search: ExpertConfig
+) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="seconds must be more than 0, not -1"):
+        train_experts(songs, out, small_search, seconds=-1.0)
+    assert not out.exists()
+    train_experts(songs, out, small_search, jobs=2)
+    before = {path: path.read_bytes() for path in out.glob("experts.*")}
+    assert len(before) == 3
+    other = dataclasses.replace(small_search, seed=1)
+    with pytest.raises(WorkFailed, match=r"no expert was trained: a: .*other settings"):
+        train_experts(songs, out, other, jobs=2)
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_a_full_disk_ends_the_work(
+    songs: Path, tmp_path: Path, small_search: ExpertConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def train(*_: Any, **__: Any) -> Any:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(expert_worker, "train_expert", train)
+    row = expert_worker.train_one(
+        expert_request(songs / "a.npz", tmp_path / "run", small_search, 0.0, 30.0)
+    )
+    assert row == {"unwritable": "No space left on device"}
+    monkeypatch.setattr(many, "work", lambda *_, **__: (each for each in [("a", row)]))
+    with pytest.raises(WorkFailed, match="a: cannot be kept: No space left on device"):
+        train_experts(songs, tmp_path / "out", small_search)
 
 
 def test_a_cluster_that_is_not_there(

@@ -17,7 +17,7 @@ import pytest
 import torch
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from pianomime.errors import InputError
+from pianomime.errors import InputError, TrainingDiverged
 from pianomime.learn.envs.batch import SongBatch
 from pianomime.learn.envs.config import ActionConfig, EnvConfig, RewardConfig
 from pianomime.learn.envs.sb3_env import Sb3Env
@@ -112,6 +112,57 @@ def test_more_steps_prolong_a_run(demo: Path, tmp_path: Path, small_ppo: ExpertC
     assert train_expert(demo, tmp_path / "parts", small_ppo).steps_done == small_ppo.total_steps
     longest = train_expert(demo, tmp_path / "parts", longer, threads=1)
     assert longest.curve() == whole.curve()
+
+
+def test_less_steps_than_were_done_are_evaluated(
+    demo: Path, tmp_path: Path, small_ppo: ExpertConfig
+) -> None:
+    """Where a run was stopped between two evaluations, what it has learned is not lost."""
+    rare = dataclasses.replace(small_ppo.ppo, evaluate_every=1000)
+    steps = small_ppo.ppo.steps_per_update
+    config = dataclasses.replace(small_ppo, total_steps=1000 * steps, ppo=rare)
+
+    def stop(phase: str, done: int, total: int, remark: str = "") -> None:
+        if done > 2 * steps:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_expert(demo, tmp_path / "run", config, threads=1, progress=stop)
+    state = ExpertRun.load(tmp_path / "run").state()
+    assert state is not None
+    assert state.steps == 2 * steps
+    run = train_expert(
+        demo, tmp_path / "run", dataclasses.replace(config, total_steps=steps), threads=1
+    )
+    assert run.steps_done == 2 * steps
+    assert run.finished
+
+
+def test_a_policy_that_diverges_is_one_line_and_the_checkpoint_stays(
+    demo: Path, tmp_path: Path, small_ppo: ExpertConfig
+) -> None:
+    wild = dataclasses.replace(small_ppo.ppo, learning_rate=1e30, n_epochs=10)
+    with pytest.raises(TrainingDiverged, match="try a lower learning rate"):
+        train_expert(demo, tmp_path / "run", dataclasses.replace(small_ppo, ppo=wild), threads=1)
+    state = ExpertRun.load(tmp_path / "run").state()
+    assert state is not None
+    assert all(np.isfinite(array).all() for array in state.arrays.values())
+
+
+def test_a_folder_in_which_nothing_was_trained_takes_another_song(
+    demo: Path, two_notes: Demonstration, tmp_path: Path, small_ppo: ExpertConfig
+) -> None:
+    out, other = tmp_path / "run", tmp_path / "other.npz"
+    two_notes.save(other)
+
+    with ExpertRun.open(out, Demonstration.load(demo), small_ppo, 0.0, 30.0):
+        pass
+    config = dataclasses.replace(small_ppo, seed=1)
+    run = train_expert(other, out, config, threads=1)
+    assert load_expert(out)[1].config == config
+    with pytest.raises(InputError, match="holds a run on another song"):
+        train_expert(demo, out, config)
+    assert run.finished
 
 
 def test_a_full_disk_leaves_the_last_good_checkpoint(
@@ -382,7 +433,7 @@ def test_songs_that_nothing_can_be_learned_on(
     ("change", "message"),
     [
         ({"total_steps": 0}, "total-steps must be 1 or more"),
-        ({"seed": -1}, "seed must be 0 or more"),
+        ({"seed": -1}, "seed must be 0 to 4294967295"),
         ({"ppo": {"num_envs": 3}}, "multiple"),
         ({"ppo": {"batch_size": 1}}, "ppo.batch-size"),
         ({"ppo": {"batch_size": 4096}}, "ppo.batch-size"),

@@ -75,9 +75,16 @@ def test_the_same_config_resumes_and_another_is_refused_by_name(tmp_path: Path) 
     assert (tmp_path / "run" / "run.json").read_bytes() == before
 
 
+def test_a_folder_in_which_nothing_was_trained_takes_other_settings(tmp_path: Path) -> None:
+    begin(tmp_path / "run")
+    begin(tmp_path / "run", {**CONFIG, "rate": 0.25}).checkpoint(ARRAYS, 1)
+    with pytest.raises(InputError, match=r"rate: 0\.25 there, 0\.5 now"):
+        begin(tmp_path / "run")
+
+
 def test_settings_that_may_differ_are_those_of_the_last_call(tmp_path: Path) -> None:
     free = ("rate", "trainer.every", "no.such.setting")
-    begin(tmp_path / "run")
+    begin(tmp_path / "run").checkpoint(ARRAYS, 1)
     other = {**CONFIG, "rate": 9.0, "trainer": {"steps": 3, "every": 0}}
     begin(tmp_path / "run", other, may_differ=free)
     assert RunFolder.load(tmp_path / "run").config == other

@@ -278,11 +278,11 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ("fields", "message"),
     [
         ({"steps": 0}, "trainer.steps must be 1 or more"),
-        ({"batch": 0}, "trainer.batch must be 1 or more"),
+        ({"batch": 0}, "trainer.batch must be 1 to 1e"),
         ({"learning_rate": float("nan")}, "trainer.learning-rate must be more than 0"),
         ({"warmup": -1}, "trainer.warmup must be 0 or more"),
         ({"ema_power": 0.0}, "trainer.ema-power must be more than 0"),
-        ({"seed": -1}, "trainer.seed must be 0 or more"),
+        ({"seed": -1}, "trainer.seed must be 0 to 4294967295"),
     ],
 )
 def test_settings_that_make_no_sense(fields: dict[str, Any], message: str) -> None:

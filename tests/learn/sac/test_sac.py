@@ -108,6 +108,11 @@ def test_a_file_of_another_training_is_not_taken_for_the_result(two_notes, tmp_p
         patch.setattr(training, "export_network", full)
         with pytest.raises(OSError, match="full"):
             train_sac([songs], out, SMALL, 1)
+
+    def learn(*_):
+        raise AssertionError("it was trained already")
+
+    monkeypatch.setattr(training._Callback, "learn", learn)
     load_network(train_sac([songs], out, SMALL, 1))
 
 

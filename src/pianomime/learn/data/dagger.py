@@ -48,7 +48,7 @@ from pianomime.policies.sampler import Sampler
 from pianomime.shown import shown
 from pianomime.staging import scratch
 from pianomime.track import DynamicTracker, IkTracker
-from pianomime.workers import Answer, Row, cores, work
+from pianomime.workers import Answer, Row, work
 from pianomime.world.device_batch import check_device, device_batch
 
 _WORKER = "pianomime.learn.data.dagger:load_dagger_worker"
@@ -219,7 +219,7 @@ def collect_dagger(
         # Whether each could be played.
         done: dict[int, bool] = {}
         turn = 0
-        with closing(work(_WORKER, groups, jobs or cores(), request=request)) as recorded:
+        with closing(work(_WORKER, groups, jobs, request=request)) as recorded:
             for group, row in recorded:
                 if "unwritable" in row:
                     raise WorkFailed(f"episodes cannot be kept: {row['unwritable']}")

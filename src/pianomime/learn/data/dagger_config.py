@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from pianomime.device_names import CPU, DEVICES, DeviceName
-from pianomime.validation import one_of, whole_numbers, within
+from pianomime.validation import check_seed, one_of, whole_numbers, within
 
 
 @dataclass(frozen=True)
@@ -45,5 +45,5 @@ class DaggerConfig:
         within("noise_correlation", self.noise_correlation, 0, 0.99)
         within("worlds", self.worlds, 1)
         one_of("device", self.device, DEVICES)
-        for name in ("max_demonstrations", "seed"):
-            within(name, getattr(self, name), 0)
+        within("max_demonstrations", self.max_demonstrations, 0)
+        check_seed("seed", self.seed)

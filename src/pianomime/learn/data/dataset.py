@@ -22,6 +22,7 @@ from pianomime.plan.plan_arrays import FINGER_KEY
 from pianomime.policies.finger_assignment import flat_heights
 from pianomime.short_repr import short_repr
 from pianomime.shown import shown
+from pianomime.songs.find import files_below
 from pianomime.world_names import PAPER
 
 DEMONSTRATION_COLUMNS = ("goal", "fingertips", "finger_key")
@@ -111,7 +112,9 @@ def read_demonstrations(source: Path) -> list[Demonstration]:
         InputError: it holds no demonstrations.
     """
     if source.is_dir():
-        found = [Demonstration.load(file) for file in sorted(source.rglob("*.npz"))]
+        found = [
+            Demonstration.load(file) for file in files_below(source, (".npz",), "demonstrations")
+        ]
     elif is_demonstration(source):
         found = [Demonstration.load(source)]
     else:

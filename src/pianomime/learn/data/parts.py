@@ -8,6 +8,7 @@ finished.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from pianomime.files import atomic
 from pianomime.learn.data.episode import COLUMNS, EVENTS, Episode, Source
 from pianomime.schema import Field
 from pianomime.sealed_json import parse_json, read_json, sealed, unsealed
+from pianomime.shown import title_of
 from pianomime.staging import is_staging
 
 _VERSION = 1
@@ -48,15 +50,20 @@ def parts_folder(out: Path) -> Path:
     return out.with_name(f"{out.name}.parts")
 
 
-def part_path(folder: Path, title: str, digest: str) -> Path:
-    """The file of a song.
+def part_paths(folder: Path, songs: Mapping[Path, str]) -> dict[Path, Path]:
+    """The file of each song: that of the same content, by whatever title it was played before.
 
     Args:
         folder: of the parts.
-        title: of the song.
-        digest: of the file of music.
+        songs: files of music, with their digests.
     """
-    return folder / f"{file_name(title)}-{digest[:_DIGITS]}.npz"
+    there = {path.stem[-_DIGITS:]: path for path in parts_in(folder)}
+    return {
+        song: there.get(
+            digest[:_DIGITS], folder / f"{file_name(title_of(song))}-{digest[:_DIGITS]}.npz"
+        )
+        for song, digest in songs.items()
+    }
 
 
 def parts_in(folder: Path) -> list[Path]:
@@ -127,7 +134,7 @@ def save_part(path: Path, episode: Episode) -> None:
     """Write an episode, whole or not at all.
 
     Args:
-        path: as of `part_path`.
+        path: as of `part_paths`.
         episode: whose source is known.
 
     Raises:

@@ -25,7 +25,7 @@ from pianomime.learn.data.parts import (
     close_parts,
     load_part,
     open_parts,
-    part_path,
+    part_paths,
     parts_folder,
     parts_in,
 )
@@ -41,8 +41,8 @@ from pianomime.progress import Progress, no_progress
 from pianomime.shown import shown, title_of
 from pianomime.songs.find import find_songs
 from pianomime.staging import hold
-from pianomime.validation import within
-from pianomime.workers import Row, cores, unwritable, work
+from pianomime.validation import check_seed, within
+from pianomime.workers import Row, unwritable, work
 
 DATA_PLAYER = "zero-shot-20hz"
 """Plays one control a frame, from any state."""
@@ -157,8 +157,10 @@ def perform(
         finished: list[Row] = []
         waiting: dict[Path, Task] = {}
         there = {} if older is None else _splits_by_digest(older)
-        for song, digest in _digests(songs, failed).items():
-            part = part_path(folder, title_of(song), digest)
+        digests = _digests(songs, failed)
+        paths_of = part_paths(folder, digests)
+        for song, digest in digests.items():
+            part = paths_of[song]
             if there.get(digest, split) != split:
                 elsewhere.append(_failure(song, f"is there already, of the split {there[digest]}"))
             elif digest in there:
@@ -212,7 +214,7 @@ def _play(
     report()
     playing: Generator[tuple[Path, Row], None, None]
     if ray is None:
-        playing = work(PERFORM_WORKER, waiting, jobs or cores(), setup, request)
+        playing = work(PERFORM_WORKER, waiting, jobs, setup, request)
     else:
         from pianomime.ray_cluster import on_cluster
 
@@ -259,6 +261,7 @@ def _put_together(
             message = f"is the same music as another song, of the split {splits[part.song_id]}"
             failed.append({"song": part.name, "error": message})
             continue
+        known.add(part.source.digest)
         parts.append(path)
     # What failed before, and was not tried now, is still missing.
     tried = {title_of(song) for song in songs}
@@ -322,7 +325,7 @@ def _checked_player(player: str | Path, setup: dict[str, Any]) -> Player:
     if not setup["seconds"] > 0:
         raise InputError(f"seconds must be more than 0, not {setup['seconds']:g}")
     within("noise", setup["noise"], 0, 1)
-    within("seed", setup["seed"], 0)
+    check_seed("seed", setup["seed"])
     casting = Casting.of(
         player, setup["effort"], setup["seed"], setup["world"], **setup["settings"]
     )

@@ -32,6 +32,7 @@ from pianomime.plan.demonstration import Demonstration
 from pianomime.players.rollout import rollout
 from pianomime.short_repr import short_repr
 from pianomime.track import BatchController, BatchTracker, DynamicTracker, IkTracker
+from pianomime.validation import within
 from pianomime.world import World
 from pianomime.world.device_batch import device_batch
 from pianomime.world.layout import LAYOUT
@@ -99,7 +100,8 @@ class SongBatch:
         observation_terms: the config's if None.
 
     Raises:
-        InputError: two terms have the same name, or the config's device cannot be used here.
+        InputError: two terms have the same name, the config's device cannot be used here, or a
+            number is out of range.
     """
 
     def __init__(
@@ -111,6 +113,8 @@ class SongBatch:
         reward_terms: Sequence[RewardTerm] | None = None,
         observation_terms: Sequence[ObservationTerm] | None = None,
     ) -> None:
+        within("num_envs", num_envs, 1)
+        within("threads", threads, 0)
         self.demonstration, self.config = demonstration, config
         self._reference = Reference.of(demonstration)
         self._worlds = device_batch(

@@ -15,7 +15,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
-from pianomime.errors import InputError
+from pianomime.errors import InputError, TrainingDiverged
 from pianomime.learn.envs.sb3_base import Sb3BaseEnv
 from pianomime.learn.runs.run import Checkpoint
 from pianomime.learn.runs.safetensors_file import Arrays
@@ -99,12 +99,20 @@ class ResumableCallback(BaseCallback):
 
         Raises:
             InputError: it is the checkpoint of another model.
+            TrainingDiverged: the policy gives no finite numbers any more; the checkpoint before
+                stays.
         """
         self.init_callback(model)
         if state is not None:
             self.resume(state.arrays, state.steps, path)
-        # Stable-Baselines3 adds the steps that were taken before to this number.
-        model.learn(steps - model.num_timesteps, self, reset_num_timesteps=state is None)
+        try:
+            # Stable-Baselines3 adds the steps that were taken before to this number.
+            model.learn(steps - model.num_timesteps, self, reset_num_timesteps=state is None)
+        except ValueError as error:
+            # Torch's distributions of actions refuse what is no number.
+            if "satisfy the constraint" not in str(error):
+                raise
+            raise self._diverged() from error
 
     def between_updates(self) -> None:
         """Save, and seed the next update."""
@@ -112,6 +120,7 @@ class ResumableCallback(BaseCallback):
         update = steps // self._steps_per_update
         # A checkpoint that was just read need not be written again.
         if self._fresh:
+            self._check_finite()
             self._env.set_state(self._env.state())
             self.save(update, steps)
         self._fresh = True
@@ -121,6 +130,22 @@ class ResumableCallback(BaseCallback):
         random.seed(seeds[2])
         self._env.action_space.seed(seeds[3])
         self._env.reseed(self._seed, update)
+
+    def _check_finite(self) -> None:
+        """Refuse to go on with weights that are not numbers.
+
+        Raises:
+            TrainingDiverged: one is not finite.
+        """
+        weights = self.model.policy.state_dict().values()
+        if not all(bool(torch.isfinite(tensor).all()) for tensor in weights):
+            raise self._diverged()
+
+    def _diverged(self) -> TrainingDiverged:
+        return TrainingDiverged(
+            f"the policy gives no finite numbers at step {self.model.num_timesteps}: "
+            "try a lower learning rate, in another folder"
+        )
 
     def _on_rollout_start(self) -> None:
         self.between_updates()

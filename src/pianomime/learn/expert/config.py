@@ -12,7 +12,7 @@ from typing import Literal
 from pianomime.device_names import CPU
 from pianomime.errors import InputError, unknown_name
 from pianomime.learn.envs.config import ENV_PRESETS, EnvConfig
-from pianomime.validation import above_zero, one_of, whole_numbers, widths, within
+from pianomime.validation import above_zero, check_seed, one_of, whole_numbers, widths, within
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class ExpertConfig:
         whole_numbers(self)
         one_of("method", self.method, ("ppo", "search"))
         within("total_steps", self.total_steps, 1)
-        within("seed", self.seed, 0)
+        check_seed("seed", self.seed)
         if self.method == "search" and self.env.device != CPU:
             # Its steps have to be those of the world in which it plays, bit for bit.
             raise InputError(f"env.device {self.env.device} needs method ppo: a search is on {CPU}")

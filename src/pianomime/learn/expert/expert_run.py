@@ -100,16 +100,20 @@ class ExpertRun:
             "seconds": seconds,
             "digest": _digest(demonstration),
         }
+        other = False
         if is_run(path):
-            there = RunFolder.load(path).config.get(_EXCERPT)
+            run = RunFolder.load(path)
+            there = run.config.get(_EXCERPT)
             if isinstance(there, dict) and there.get("digest") != excerpt["digest"]:
-                raise InputError(
-                    f"{path}: holds a run on another song, or another part of it "
-                    f"({there.get('title')}); name another folder"
-                )
+                other = True
+                if run.begun:
+                    raise InputError(
+                        f"{path}: holds a run on another song, or another part of it "
+                        f"({there.get('title')}); name another folder"
+                    )
         content = {_EXCERPT: excerpt, **to_json(config)}
         with RunFolder.open(path, _KIND, content, _MAY_DIFFER) as folder:
-            if not (path / _DEMONSTRATION).exists():
+            if other or not (path / _DEMONSTRATION).exists():
                 demonstration.save(path / _DEMONSTRATION)
             yield cls(folder, demonstration, config, start, seconds)
 

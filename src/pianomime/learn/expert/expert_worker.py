@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import time
 from pathlib import Path
@@ -12,6 +13,8 @@ from pianomime.learn.expert.expert import train_expert
 from pianomime.learn.runs.config_json import from_json, to_json
 from pianomime.workers import Answer, Row
 
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Of errors that say that a disk, or a share of it, is full."""
 EXPERT_WORKER = "pianomime.learn.expert.expert_worker:load_expert_worker"
 """`load_expert_worker`, for `pianomime.workers`."""
 
@@ -48,21 +51,26 @@ def train_one(request: dict[str, Any]) -> Row:
 
     Returns:
         `f1`, `precision` and `recall` of the best expert; `steps` of the run; `seconds` that this
-        call took.
+        call took. Or `unwritable`, the reason why no run can be kept, of any song.
 
     Raises:
         InputError: the song, the config or what is in the folder cannot be used.
-        OSError: the folder cannot be written; what was there before stays.
+        OSError: a file cannot be read or written; what was there before stays.
     """
     began = time.perf_counter()
-    run = train_expert(
-        request["song"],
-        Path(request["out"]),
-        from_json(ExpertConfig, request["config"]),
-        request["start"],
-        request["seconds"],
-        threads=1,
-    )
+    try:
+        run = train_expert(
+            request["song"],
+            Path(request["out"]),
+            from_json(ExpertConfig, request["config"]),
+            request["start"],
+            request["seconds"],
+            threads=1,
+        )
+    except OSError as error:
+        if error.errno not in _FULL:
+            raise
+        return {"unwritable": error.strerror or str(error)}
     spent = {"steps": run.steps_done, "seconds": round(time.perf_counter() - began, 1)}
     return {**run.best()[1], **spent}
 

@@ -6,7 +6,7 @@ import json
 from contextlib import closing
 from pathlib import Path
 
-from pianomime.errors import InputError
+from pianomime.errors import InputError, WorkFailed
 from pianomime.file_names import file_names
 from pianomime.files import atomic
 from pianomime.keyboard import EXCERPT_SECONDS
@@ -14,11 +14,12 @@ from pianomime.learn.expert.config import ExpertConfig
 from pianomime.learn.expert.expert_worker import EXPERT_WORKER, expert_request
 from pianomime.learn.expert.f1_chart import draw_f1_chart
 from pianomime.learn.runs.run import is_run
+from pianomime.music.excerpt import check_part
 from pianomime.progress import Progress, no_progress
 from pianomime.shown import markdown_cell
 from pianomime.songs.find import MIDI_SUFFIXES, files_below
 from pianomime.staging import hold
-from pianomime.workers import Row, cores, work
+from pianomime.workers import Row, unwritable, work
 
 
 def train_experts(
@@ -52,8 +53,11 @@ def train_experts(
     Raises:
         InputError: settings do not fit, there are no songs, `out` is their folder, or there is no
             such cluster.
+        WorkFailed: no expert could be trained, or the disk is full; results of an earlier call
+            stay.
         OSError: `out` cannot be written.
     """
+    check_part(start, seconds)
     songs = find_experts_songs(folder, out)
     if jobs is not None and jobs < 1:
         raise InputError(f"jobs must be 1 or more, not {jobs}")
@@ -74,16 +78,27 @@ def train_experts(
 
         report()
         if ray is None:
-            trained = work(EXPERT_WORKER, requests, jobs or cores(), request=requests.__getitem__)
+            trained = work(
+                EXPERT_WORKER,
+                requests,
+                jobs,
+                request=requests.__getitem__,
+            )
         else:
             from pianomime.ray_cluster import on_cluster
 
             trained = on_cluster(EXPERT_WORKER, requests, ray, request=requests.__getitem__)
         with closing(trained):
             for name, row in trained:
+                if "unwritable" in row:
+                    raise unwritable(name, row["unwritable"])
                 rows[name] = {"song": name, **row}
                 report()
         ordered = [rows[name] for name in songs]
+        failed = [row for row in ordered if "error" in row]
+        if len(failed) == len(ordered):
+            # The results of an earlier call, if any, stay.
+            raise WorkFailed(f"no expert was trained: {failed[0]['song']}: {failed[0]['error']}")
         _write(out / "experts.json", json.dumps(ordered, indent=1) + "\n")
         _write(out / "experts.md", experts_table(ordered))
         draw_f1_chart(ordered, out / "experts.png")

@@ -48,7 +48,12 @@ def train_ppo(run: ExpertRun, threads: int, progress: Progress) -> None:
     model.set_logger(configure(str(run.tensorboard), ["tensorboard"]))
     callback = _ExpertCallback(run, env, progress)
     callback.curve = run.curve()
-    callback.learn(model, run.config.total_steps, run.state(), run.path)
+    state = run.state()
+    callback.learn(model, run.config.total_steps, state, run.path)
+    steps = model.num_timesteps
+    if state is not None and state.steps == steps > callback.curve[-1].steps:
+        # Nothing is left to learn where fewer steps are wanted than before, but to evaluate.
+        callback.save(steps // settings.steps_per_update, steps)
     callback.between_updates()
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pianomime.errors import InputError
 from pianomime.keyboard import EXCERPT_SECONDS
-from pianomime.validation import above_zero, whole_numbers, widths, within
+from pianomime.validation import above_zero, check_seed, whole_numbers, widths, within
 
 VALIDATION_SONGS = 8
 """Songs that are kept from training, on which the F1 is measured."""
@@ -47,15 +47,17 @@ class FingersConfig:
 
     def __post_init__(self) -> None:
         whole_numbers(self)
-        for name in ("total_steps", "num_envs", "steps_per_update", "n_epochs"):
+        for name in ("total_steps", "steps_per_update", "n_epochs"):
             within(name, getattr(self, name), 1)
+        within("num_envs", self.num_envs, 1, 10_000)
         within("batch_size", self.batch_size, 2)
         for name in ("learning_rate", "action_std", "seconds"):
             above_zero(name, getattr(self, name))
         for name in ("gamma", "gae_lambda"):
             within(name, getattr(self, name), 0, 1)
-        for name in ("action_cost", "wrong_key_cost", "seed"):
+        for name in ("action_cost", "wrong_key_cost"):
             within(name, getattr(self, name), 0)
+        check_seed("seed", self.seed)
         widths("hidden", self.hidden)
         if self.steps_per_update % self.num_envs:
             raise InputError(

@@ -26,6 +26,7 @@ from pianomime.learn.imitation.export import export_network
 from pianomime.learn.runs.log import RunLog
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.torch_threads import torch_threads
+from pianomime.learn.runs.trainer import load_arrays
 from pianomime.plan.demonstration import Demonstration, DemonstrationPlanner
 from pianomime.players.player import PlannedPlayer
 from pianomime.policies.finger_residual import ACTIONS, AGENTS, SIZE, FingerResidualTracker
@@ -88,15 +89,19 @@ def train_fingers(
         env = FingersVecEnv(train, config, threads)
         model = _model(env, config)
         model.threads = threads or torch.get_num_threads()
-        state = folder.state()
-        since = 1 if state is None else state.steps + 1
-        progress("training", (since - 1) // AGENTS, config.total_steps)
-        with closing(RunLog(folder.tensorboard, since)) as log:
-            callback = _Callback(folder, env, config, log, progress)
-            model.set_logger(Logger(None, []))
-            callback.learn(model, config.total_steps * AGENTS, state, folder.path)
         network = actor_network(model).eval()
-        metrics = _evaluate(validation, network, progress)
+        if folder.has_result:  # It was not exported.
+            weights, metrics = folder.result()
+            load_arrays(network, weights, folder.path)
+        else:
+            state = folder.state()
+            since = 1 if state is None else state.steps + 1
+            progress("training", (since - 1) // AGENTS, config.total_steps)
+            with closing(RunLog(folder.tensorboard, since)) as log:
+                callback = _Callback(folder, env, config, log, progress)
+                model.set_logger(Logger(None, []))
+                callback.learn(model, config.total_steps * AGENTS, state, folder.path)
+            metrics = _evaluate(validation, network.eval(), progress)
         weights = {name: tensor.numpy().copy() for name, tensor in network.state_dict().items()}
         # A file of another training must not be taken for the result if the export fails.
         result.unlink(missing_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,7 +43,8 @@ class GoalMetrics:
         error_mm: mean error of the decoded distance [mm].
         code_correlation: rank correlation (Spearman) of the distances between codes with the
             Chamfer distances between goals.
-        key_correlation: the same for the number of keys in which goals differ, as a baseline.
+        key_correlation: the same for the number of keys in which goals differ, as a baseline. Both
+            are NaN where all distances are alike.
     """
 
     error_mm: float
@@ -140,9 +142,16 @@ def evaluate_autoencoder(module: GoalAutoencoder, goal: Tensor) -> GoalMetrics:
     keys_apart = torch.cdist(few, few, p=1)[pairs]
     return GoalMetrics(
         float(error.abs().mean() * 1e3),
-        float(spearmanr(goals_apart, codes_apart).statistic),
-        float(spearmanr(goals_apart, keys_apart).statistic),
+        _rank_correlation(goals_apart, codes_apart),
+        _rank_correlation(goals_apart, keys_apart),
     )
+
+
+def _rank_correlation(one: Tensor, other: Tensor) -> float:
+    """Spearman's; NaN where one of them is all alike, as the distances of single notes may be."""
+    if any(bool((row == row[:1]).all()) for row in (one, other)):
+        return math.nan
+    return float(spearmanr(one, other).statistic)
 
 
 def _loss(module: nn.Module, batch: Batch) -> Tensor:

@@ -105,8 +105,13 @@ class BetConfig:
 
     def __post_init__(self) -> None:
         whole_numbers(self, "bet")
-        for name, least in (("layers", 1), ("heads", 1), ("width", 1), ("bins", 2)):
-            within(f"bet.{name}", getattr(self, name), least)
+        for name, least, most in (
+            ("layers", 1, 64),
+            ("heads", 1, 64),
+            ("width", 1, 8192),
+            ("bins", 2, 1024),
+        ):
+            within(f"bet.{name}", getattr(self, name), least, most)
         if self.width % self.heads:
             raise InputError(
                 f"bet.width ({self.width}) must be a multiple of bet.heads ({self.heads})"

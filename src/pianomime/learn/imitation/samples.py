@@ -98,7 +98,8 @@ class Samples:
         Args:
             rows: (B,) frames.
             octaves: (B,) by how many octaves to move the sample up. It stays where it is if that
-                leads off the keyboard, or to controls beyond the reach of the forearms.
+                leads off the keyboard, or in its first frame to controls beyond the reach of the
+                forearms.
         """
         return self._relative(self._absolute(rows, octaves))
 

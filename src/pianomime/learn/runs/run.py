@@ -70,6 +70,8 @@ class RunFolder:
     ) -> Iterator[RunFolder]:
         """Begin a run, or resume one of the same config; nobody else trains there meanwhile.
 
+        A folder in which nothing was trained yet takes any config.
+
         What a kill or a full disk left of files that were being written is removed.
 
         Args:
@@ -96,7 +98,8 @@ class RunFolder:
                         f"not {kind}); name another folder"
                     )
                 odd = differences(_without(there.config, may_differ), _without(given, may_differ))
-                if odd:
+                # A run in which nothing was trained yet may become one of other settings.
+                if odd and there.begun:
                     raise InputError(
                         f"{path}: holds a run with other settings ({', '.join(odd)}); "
                         "name another folder"
@@ -170,6 +173,11 @@ class RunFolder:
         """
         content = {"steps": steps, "metadata": dict(metadata or {})}
         write_tensors(self.path / _STATE, arrays, content)
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is anything that was trained."""
+        return (self.path / _STATE).exists() or self.has_result
 
     @property
     def has_result(self) -> bool:

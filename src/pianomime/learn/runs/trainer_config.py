@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pianomime.validation import above_zero, whole_numbers, within
+from pianomime.validation import above_zero, check_seed, whole_numbers, within
+
+_LARGEST_BATCH = 1_000_000
+"""Samples that no machine is short of memory for, and more than anybody wants."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +38,13 @@ class TrainerConfig:
 
     def __post_init__(self) -> None:
         whole_numbers(self, "trainer")
-        for name in ("steps", "batch"):
-            within(f"trainer.{name}", getattr(self, name), 1)
+        within("trainer.steps", self.steps, 1)
+        within("trainer.batch", self.batch, 1, _LARGEST_BATCH)
         for name in ("learning_rate", "ema_power"):
             above_zero(f"trainer.{name}", getattr(self, name))
-        for name in ("weight_decay", "seed", "checkpoint_seconds", "evaluate_every"):
+        for name in ("weight_decay", "checkpoint_seconds", "evaluate_every"):
             within(f"trainer.{name}", getattr(self, name), 0)
+        check_seed("trainer.seed", self.seed)
         within("trainer.warmup", self.warmup, 0)
         if self.warmup >= self.steps:
             # Whoever asks for a few updates to try it out does not think of this setting.

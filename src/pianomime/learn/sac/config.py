@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from pianomime.keyboard import EXCERPT_SECONDS
-from pianomime.validation import above_zero, one_of, whole_numbers, widths, within
+from pianomime.validation import above_zero, check_seed, one_of, whole_numbers, widths, within
 
 Algorithm = Literal["sac", "tqc"]
 
@@ -54,7 +54,7 @@ class SacConfig:
         for name in ("gamma", "hit"):
             within(name, getattr(self, name), 0, 1)
         within("reach", self.reach, 0)
-        within("seed", self.seed, 0)
+        check_seed("seed", self.seed)
         widths("hidden", self.hidden)
         within("total_steps", self.total_steps, self.learning_starts + 1)
 

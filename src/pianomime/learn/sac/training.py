@@ -29,6 +29,7 @@ from pianomime.learn.imitation.normalizer import StandardNormalizer
 from pianomime.learn.runs.log import RunLog
 from pianomime.learn.runs.run import RunFolder
 from pianomime.learn.runs.safetensors_file import Arrays
+from pianomime.learn.runs.trainer import load_arrays
 from pianomime.learn.sac.config import Algorithm, SacConfig
 from pianomime.music import Score
 from pianomime.policies.features import holding_controls, tracking_observation
@@ -187,22 +188,26 @@ def train_sac(
             seed=config.seed,
             device="cpu",
         )
-        model.set_logger(Logger(None, []))
-        state = folder.state()
-        since = 1 if state is None else state.steps + 1
-        progress("training", since - 1, config.total_steps)
-        with closing(RunLog(folder.tensorboard, since)) as log:
-            callback = _Callback(folder, env, config, log, progress)
-            callback.learn(model, config.total_steps, state, folder.path)
         actor = _Actor(normalizer, model.policy.actor).eval()
+        if folder.has_result:  # It was not exported.
+            load_arrays(actor, folder.result()[0], folder.path)
+        else:
+            model.set_logger(Logger(None, []))
+            state = folder.state()
+            since = 1 if state is None else state.steps + 1
+            progress("training", since - 1, config.total_steps)
+            with closing(RunLog(folder.tensorboard, since)) as log:
+                callback = _Callback(folder, env, config, log, progress)
+                callback.learn(model, config.total_steps, state, folder.path)
+            actor.eval()
         info = PolicyInfo(NAME, "end-to-end", "mlp", LAYOUT.ctrl_size, data=content["data"])
         example = {
             "goal": torch.zeros(2, CHUNK, KEYS),
             "vector": torch.zeros(2, _VECTOR_SIZE),
         }
-        weights = {name: tensor.numpy().copy() for name, tensor in actor.state_dict().items()}
         # A file of another training must not be taken for the result if the export fails.
         result.unlink(missing_ok=True)
+        weights = {name: tensor.numpy().copy() for name, tensor in actor.state_dict().items()}
         folder.keep_result(weights, {})
         export_network(actor, example, ["action"], info, result)
     return result

@@ -20,7 +20,7 @@ from pianomime.learn.data.dataset import (
 )
 from pianomime.learn.imitation.export import export_network
 from pianomime.learn.runs.trainer import train_network
-from pianomime.learn.three_stage.config import StageConfig, StageName
+from pianomime.learn.three_stage.config import STAGES, StageConfig, StageName
 from pianomime.learn.three_stage.fingering_samples import FingeringSamples
 from pianomime.learn.three_stage.hand_samples import (
     CONTROLS_COLUMNS,
@@ -32,6 +32,7 @@ from pianomime.policies.horizon import CHUNK
 from pianomime.policies.policy import PolicyInfo
 from pianomime.policies.three_stage import fingering, hand_controls, hand_motion
 from pianomime.progress import Progress, no_progress
+from pianomime.validation import one_of
 
 _NORMALIZER_SAMPLES = 20_000
 """Training samples that the normalizers are fitted to."""
@@ -65,9 +66,11 @@ def train_stage(
         The ONNX file.
 
     Raises:
-        InputError: data are missing or cannot be used, or the folder holds another training.
+        InputError: there is no such stage, data are missing or cannot be used, or the folder holds
+            another training.
         OSError: a file cannot be read or written.
     """
+    one_of("stage", name, STAGES)
     progress("reading", 0, 0)
     columns = CONTROLS_COLUMNS if name == "hand-controls" else DEMONSTRATION_COLUMNS
     dataset = trajectory_dataset(experts, columns)
