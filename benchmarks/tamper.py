@@ -141,12 +141,13 @@ def _expert(method: str) -> Callable[[Path], None]:
 def _trajectories(path: Path) -> None:
     from pianomime.learn.data.dagger import collect_dagger_episodes
     from pianomime.learn.data.dagger_config import DaggerConfig
+    from pianomime.learn.data.episode import Episode
     from pianomime.learn.data.trajectories import write_trajectories
 
     with tempfile.TemporaryDirectory() as folder:
         shown = _with_demonstration(Path(folder, "d.npz"))
     episodes = collect_dagger_episodes([shown] * 2, range(2), DaggerConfig())
-    write_trajectories(path, iter(episodes))
+    write_trajectories(path, (each for each in episodes if isinstance(each, Episode)))
 
 
 def _goal(path: Path) -> None:

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 _MOST_LAYERS, _WIDEST = 8, 8192
 """Of a network: what a damaged file asks for must not fill the memory."""
-_LARGEST_SEED = 2**32 - 1
-"""What NumPy and Stable-Baselines3 take."""
 _ROUNDING = 1e-6
 """Share of a unit by which its multiple may be off, as 3 * 0.005 is from 0.015."""
 
@@ -35,17 +33,21 @@ def within(name: str, value: float, least: float, most: float = math.inf) -> Non
         raise InputError(f"{name.replace('_', '-')} must be {wanted}, not {value:g}")
 
 
-def check_seed(name: str, seed: int) -> None:
-    """Refuse a seed that not every generator of random numbers takes.
+def check_seed(name: str, seed: int, bits: int = 32) -> None:
+    """Refuse a seed that is too large.
+
+    Args:
+        name: of the setting.
+        seed: that was given.
+        bits: that it may have; NumPy's older generator and Stable-Baselines3 take 32.
 
     Raises:
-        InputError: it is negative or of more than 32 bits; the message names it as the command line
-            does.
+        InputError: it is negative, or has more bits; the message names it as the command line does.
     """
     if not isinstance(seed, int):
         raise InputError(f"{name.replace('_', '-')} must be a whole number, not {seed!r}")
-    if not 0 <= seed <= _LARGEST_SEED:
-        raise InputError(f"{name.replace('_', '-')} must be 0 to {_LARGEST_SEED}, not {seed}")
+    if not 0 <= seed < 2**bits:
+        raise InputError(f"{name.replace('_', '-')} must be 0 to {2**bits - 1}, not {seed}")
 
 
 def above_zero(name: str, value: float) -> None:

@@ -222,7 +222,7 @@ def answered(answer: Answer, request: Any) -> Row:
     """The row of a request, whatever happens."""
     try:
         return answer(request)
-    except (InputError, OSError) as error:
+    except (InputError, WorkFailed, OSError) as error:
         return {"error": shown(error)}
     except Exception as error:  # A bug of ours must not cost the other items either.
         where = traceback.extract_tb(error.__traceback__)[-1]

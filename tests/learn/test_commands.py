@@ -143,6 +143,7 @@ MISSING: list[tuple[list[str], str]] = [
     (["train", "bc-mse", "--experts", "file"], "`pianomime collect-dagger"),
     (["train", "high-diff", "--demonstrations", "no"], "does not exist; `pianomime import-d"),
     (["train", "high-diff", "--demonstrations", "empty"], "`pianomime import-demos`"),
+    (["collect-dagger", "demo.npz", "--device", "cuda"], "the device cuda needs"),
     (["train-stage", "fingering", "--experts"], "no data sets are named; "),
     (["train", "high-diff-no-sdf", "--experts", "x", "--goal", "y"], "needs no goal encoder"),
     (["collect", "run", "--demonstrations", "x.npz"], "--demonstrations: runs hold theirs"),

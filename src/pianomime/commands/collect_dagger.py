@@ -41,6 +41,8 @@ class CollectDagger:
         --fingertip-policy out/generalist/high-diff.onnx
       pianomime collect-dagger MIDI_FOLDER -o songs.zarr \
         --fingertip-policy out/generalist/high-diff.onnx
+      pianomime collect-dagger demonstrations.npz -o dagger.zarr \
+        --device cuda --worlds 64
       pianomime train low-diff --experts dagger.zarr more.zarr songs.zarr
     """
 
@@ -50,15 +52,16 @@ class CollectDagger:
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"], metavar="OUT")] = Path("out/dagger.zarr")
     """The data set; an existing one is replaced."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")] = None
-    """Demonstrations played at the same time; one a core if not given."""
+    """Processes, each of which plays one demonstration, or --worlds of them side by side; one a
+    core if not given."""
     config: Annotated[DaggerConfig, tyro.conf.arg(name="")] = field(default_factory=DaggerConfig)
-    """Policies that play, and the noise."""
+    """Policies that play, the noise, and what steps the worlds."""
 
     def run(self) -> None:
         """Collect, and print how well the demonstrations were played.
 
         Raises:
-            InputError: demonstrations or a policy cannot be used.
+            InputError: demonstrations, a policy or the device cannot be used.
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.extras import extra
@@ -91,19 +94,19 @@ class CollectDagger:
         if not songs:
             need_demonstrations(self.demonstrations)
         need_place_for_data_set(self.out)
-        if self.config.rollout_policy is not None or self.config.fingertip_policy is not None:
-            from pianomime.learn.data.dagger import check_policies
+        if self.config != DaggerConfig():
+            from pianomime.learn.data.dagger import check_config
 
-            check_policies(self.config)
+            check_config(self.config)
 
     def _songs(self) -> list[Path]:
         """The MIDI files whose fingertips are to be predicted; none if there are demonstrations."""
-        from pianomime.commands.needs import holds_demonstrations
+        from pianomime.commands.needs import demonstration_files
         from pianomime.errors import InputError
         from pianomime.songs.find import MIDI_SUFFIXES, files_below
 
         source, songs = self.demonstrations, list[Path]()
-        if source.is_dir() and not holds_demonstrations(source):
+        if source.is_dir() and not demonstration_files(source):
             with suppress(InputError):
                 songs = files_below(source, MIDI_SUFFIXES, "MIDI files")
         elif source.suffix.lower() in MIDI_SUFFIXES and source.is_file():

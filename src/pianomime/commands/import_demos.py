@@ -40,10 +40,11 @@ class ImportDemos:
             InputError: the data are not what they should be.
             OSError: a file cannot be read or written.
         """
-        from pianomime.commands.needs import need_folder, need_packages
+        from pianomime.commands.needs import demonstration_files, need_folder, need_packages
         from pianomime.commands.progress import bars
         from pianomime.errors import InputError
         from pianomime.file_names import file_name
+        from pianomime.short_repr import count
         from pianomime.shown import shown
         from pianomime.validation import within
 
@@ -65,13 +66,14 @@ class ImportDemos:
                 demonstration.save(folder / f"{file_name(demonstration.score.title)}.npz")
                 number += 1
                 progress("importing", number, total)
-            # Not what macOS writes beside files.
-            there = {path.name for path in out.glob("[!.]*.npz")}
-            others = there - {path.name for path in folder.iterdir()}
+            written = {path.name for path in folder.iterdir()}
+        there = demonstration_files(out)
+        others = [path for path in there if path.parent != out or path.name not in written]
         if others:
+            files = count(len(others), "more .npz file")
             warnings.warn(
-                f"{out}: holds {len(others)} more .npz files, which were there before; what learns "
-                "from the folder learns from them, too",
+                f"{out}: holds {files} of before; what learns from the folder learns from them, "
+                "too",
                 stacklevel=2,
             )
         print(f"saved {number} demonstrations: {shown(out)}")

@@ -144,7 +144,7 @@ def need_demonstrations(source: Path) -> None:
     if not source.exists():
         raise InputError(f"{source}: does not exist; {_MAKES_DEMOS}")
     if source.is_dir():
-        if not holds_demonstrations(source):
+        if not demonstration_files(source):
             if zarr_attributes(source) is not None or next(source.rglob(".zgroup"), None):
                 raise InputError(
                     f"{source}: is a zarr data set, not a folder of demonstrations; if it is the "
@@ -155,16 +155,16 @@ def need_demonstrations(source: Path) -> None:
         raise InputError(f"{source}: not a file of demonstrations (.npz); {_MAKES_DEMOS}")
 
 
-def holds_demonstrations(folder: Path) -> bool:
-    """Whether there are files such as those of demonstrations in a folder or below it."""
+def demonstration_files(folder: Path) -> list[Path]:
+    """The files in a folder or below it that are named as demonstrations are; there may be none."""
     from pianomime.songs.find import files_below
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # They are told where the files are read.
         try:
-            return bool(files_below(folder, (".npz",), "demonstrations"))
+            return files_below(folder, (".npz",), "demonstrations")
         except InputError:
-            return False
+            return []
 
 
 def need_experts(path: Path) -> None:

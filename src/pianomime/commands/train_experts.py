@@ -24,7 +24,7 @@ class TrainExperts:
 
     OUT then holds a run for each song, the table (experts.md, experts.json) and a bar chart of the
     F1 (experts.png). Started again with the same OUT, interrupted runs resume and finished ones are
-    kept. A song that fails is a line of the table.
+    kept. A song that fails is a line of the table; if all fail, the exit code is 1.
 
     Examples:
       pianomime train-experts FOLDER
@@ -66,6 +66,7 @@ class TrainExperts:
 
         Raises:
             InputError: there are no songs, or the folder, the device or the cluster cannot be used.
+            WorkFailed: no expert could be trained, or the disk is full.
             OSError: a file cannot be read or written.
         """
         from pianomime.commands.needs import RAY, need_folder, need_packages

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import ClassVar
 
 import numpy as np
@@ -33,6 +34,12 @@ class PolicyTracker:
     ) -> None:
         self._policy, self._seed, self._fingertips = policy, seed, fingertips
         self._ik = IkTracker() if residual else None
+
+    def seeded(self, seed: int) -> PolicyTracker:
+        """The same policy with another seed of its sampling; nothing is loaded again."""
+        other = copy.copy(self)
+        other._seed = seed
+        return other
 
     def start(self, plan: FingertipPlan) -> PolicyController:
         """A controller whose goals are the keys that the plan presses."""

@@ -15,7 +15,8 @@ from pianomime.learn.data.dagger import (
     songs_without_plan,
 )
 from pianomime.learn.data.dagger_config import DaggerConfig
-from pianomime.learn.data.episode import Episode
+from pianomime.learn.data.episode import Episode, record
+from pianomime.learn.data.noisy_controller import NoisyController, noise_spread
 from pianomime.learn.data.trajectories import TrajectoryData
 from pianomime.music import Score
 from pianomime.plan import ZeroShotPlanner
@@ -87,6 +88,81 @@ def test_episodes_are_the_same_however_many_share_a_batch(two_notes, rollout):
                 np.testing.assert_array_equal(getattr(two, columns)[name], values, err_msg=name)
                 np.testing.assert_array_equal(getattr(three, columns)[name], values, err_msg=name)
     assert len(alone[1].columns["action"]) < len(alone[0].columns["action"])
+
+
+def test_an_episode_is_what_a_world_plays(two_notes):
+    """Bit for bit, as `perform` records it."""
+    made = _episode(two_notes, 0, DaggerConfig(worlds=1))
+    feasible = make_feasible(two_notes.plan)
+    rng = np.random.default_rng([0, 0])
+    spread = noise_spread(DaggerConfig.noise * rng.random())
+    rng.integers(2**31, size=2)
+    expert = DynamicTracker().start(feasible)
+    controller = NoisyController(expert, None, spread, DaggerConfig.noise_correlation, rng)
+    columns, _, events = record(controller, two_notes.score)
+    for name in ("joints", "velocities", "keys", "pressed"):
+        np.testing.assert_array_equal(made.columns[name], columns[name], err_msg=name)
+    for name, values in events.items():
+        np.testing.assert_array_equal(made.events[name], values, err_msg=name)
+    assert len(events["event_time"])
+
+
+class _Failing(NoisyController):
+    """Cannot go on in a frame of the second demonstration."""
+
+    def control(self, frame, world):
+        if frame == 5 and self.labels.shape[0] == _Failing.frames:
+            raise InputError("the network's action is not what it should be")
+        return super().control(frame, world)
+
+
+def test_one_that_cannot_be_played_to_the_end_costs_no_other(two_notes, monkeypatch):
+    score = two_notes.score.clip(0.0, 0.7)
+    short = replace(two_notes, score=score, plan=ZeroShotPlanner().plan(score))
+    _Failing.frames = len(short.plan)
+    alone = [_episode(two_notes, number, QUIET) for number in (0, 2)]
+    monkeypatch.setattr(dagger, "NoisyController", _Failing)
+    first, failed, last = collect_dagger_episodes([two_notes, short, two_notes], range(3), QUIET)
+    assert isinstance(failed, InputError)
+    for one, other in zip((first, last), alone, strict=True):
+        np.testing.assert_array_equal(one.columns["joints"], other.columns["joints"])
+
+
+def test_a_group_that_fails_as_a_whole_is_played_one_by_one(two_notes, monkeypatch):
+    """As where its process dies for want of memory."""
+    sizes = []
+
+    def work(worker, groups, jobs, request):
+        answer = dagger.load_dagger_worker(None)
+        for group in groups:
+            sizes.append(len(group))
+            row = {"error": "its process died"} if len(group) > 1 or group.start == 1 else None
+            yield group, row or answer(request(group))
+
+    monkeypatch.setattr(dagger, "work", work)
+    clips = [
+        replace(two_notes, score=replace(two_notes.score, title=title)) for title in ("a", "b", "c")
+    ]
+    config = replace(QUIET, worlds=2)
+    with pytest.warns(UserWarning, match="left out: b: cannot be recorded: its process died"):
+        assert [one.name for one in collect_dagger(clips, config, jobs=1)] == ["a", "c"]
+    assert sizes == [2, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("number", "worlds", "jobs", "sizes"),
+    [
+        (5, 1, 2, [1] * 5),
+        (5, 64, 2, [3, 2]),
+        (5, 2, 1, [2, 2, 1]),
+        (2, 9, 4, [1, 1]),
+        (0, 9, 2, []),
+    ],
+)
+def test_no_process_is_idle_while_others_have_several_to_play(number, worlds, jobs, sizes):
+    groups = dagger._groups(number, worlds, jobs)
+    assert [len(group) for group in groups] == sizes
+    assert [each for group in groups for each in group] == list(range(number))
 
 
 def test_on_another_device_it_is_nearly_the_same(two_notes):

@@ -118,7 +118,7 @@ def test_what_is_no_demonstration_of_a_folder_is_not_read(four_clips, tmp_path, 
     assert len(read_demonstrations(demos)) == 2
     capsys.readouterr()
     cli.main(["import-demos", str(four_clips), "-o", str(demos), "--clips", "1"])
-    assert "holds 3 more .npz files, which were there before" in capsys.readouterr().err
+    assert "holds 3 more .npz files of before" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -332,3 +332,11 @@ def test_a_start_in_the_middle_has_the_pedal_as_it_is(two_notes: Demonstration) 
 def test_presets_are_named_in_mistakes(preset: Callable[[str], object]) -> None:
     with pytest.raises(InputError, match="paper, best"):
         preset("worst")
+
+
+@pytest.mark.parametrize("numbers", [{"num_envs": 0}, {"threads": -1}])
+def test_numbers_of_environments_and_threads(
+    shallow: Demonstration, numbers: dict[str, int]
+) -> None:
+    with pytest.raises(InputError, match="must be"):
+        SongBatch(shallow, EnvConfig(), **numbers)

@@ -150,13 +150,25 @@ def test_a_policy_that_diverges_is_one_line_and_the_checkpoint_stays(
 
 
 def test_a_folder_in_which_nothing_was_trained_takes_another_song(
-    demo: Path, two_notes: Demonstration, tmp_path: Path, small_ppo: ExpertConfig
+    demo: Path,
+    two_notes: Demonstration,
+    tmp_path: Path,
+    small_ppo: ExpertConfig,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out, other = tmp_path / "run", tmp_path / "other.npz"
     two_notes.save(other)
 
     with ExpertRun.open(out, Demonstration.load(demo), small_ppo, 0.0, 30.0):
         pass
+
+    def killed(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Demonstration, "save", killed)
+        with pytest.raises(KeyboardInterrupt):
+            train_expert(other, out, small_ppo, threads=1)
     config = dataclasses.replace(small_ppo, seed=1)
     run = train_expert(other, out, config, threads=1)
     assert load_expert(out)[1].config == config

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pianomime.errors import InputError
-from pianomime.learn.goal.autoencoder import GoalEncoder
+from pianomime.learn.goal.autoencoder import GoalAutoencoder, GoalEncoder
 from pianomime.learn.goal.config import GoalConfig
 from pianomime.learn.goal.goals import Goals, read_goals, transpose
 from pianomime.learn.goal.sdf import KEYBOARD_LENGTH, distance
-from pianomime.learn.goal.training import load_encoder, train_goal
+from pianomime.learn.goal.training import evaluate_autoencoder, load_encoder, train_goal
 from pianomime.learn.runs.trainer_config import TrainerConfig
 from pianomime.music import Score
 from pianomime.progress import no_progress
@@ -163,3 +163,12 @@ def test_goals_are_counted_once():
 def test_settings_out_of_range_are_refused(settings):
     with pytest.raises(InputError, match="must be"):
         GoalConfig(**settings)
+
+
+def test_distances_that_are_all_alike_have_no_rank_correlation():
+    """As those between goals of two single notes, of which there is one."""
+    module, goal = GoalAutoencoder(4).eval(), torch.zeros(2, 88)
+    goal[0, 40] = goal[1, 50] = 1.0
+    metrics = evaluate_autoencoder(module, goal)
+    assert np.isnan([metrics.code_correlation, metrics.key_correlation]).all()
+    assert np.isfinite(metrics.error_mm)

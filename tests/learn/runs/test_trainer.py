@@ -278,7 +278,7 @@ def test_folders_that_cannot_be_used(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ("fields", "message"),
     [
         ({"steps": 0}, "trainer.steps must be 1 or more"),
-        ({"batch": 0}, "trainer.batch must be 1 to 1e"),
+        ({"batch": 0}, "trainer.batch must be 1 to 65536"),
         ({"learning_rate": float("nan")}, "trainer.learning-rate must be more than 0"),
         ({"warmup": -1}, "trainer.warmup must be 0 or more"),
         ({"ema_power": 0.0}, "trainer.ema-power must be more than 0"),

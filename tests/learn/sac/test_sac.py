@@ -8,7 +8,7 @@ from sb3_contrib import TQC
 from stable_baselines3 import SAC
 
 from pianomime import load_player
-from pianomime.errors import InputError
+from pianomime.errors import InputError, TrainingDiverged
 from pianomime.learn.envs.reward import REACH_BOUND, REACH_MARGIN, press_reward, reach_reward
 from pianomime.learn.envs.sb3_multi_song import PlayedFrame
 from pianomime.learn.runs.run import RunFolder
@@ -114,6 +114,22 @@ def test_a_file_of_another_training_is_not_taken_for_the_result(two_notes, tmp_p
 
     monkeypatch.setattr(training._Callback, "learn", learn)
     load_network(train_sac([songs], out, SMALL, 1))
+
+
+def test_weights_that_diverge_in_the_last_update_are_no_result(two_notes, tmp_path, monkeypatch):
+    songs, out = tmp_path / "songs", tmp_path / "out"
+    songs.mkdir()
+    two_notes.score.to_midi(songs / "one.mid")
+    learn = SAC.learn
+
+    def diverge(model, *given, **named):
+        learn(model, *given, **named)
+        next(model.policy.parameters()).data.fill_(float("nan"))
+
+    monkeypatch.setattr(SAC, "learn", diverge)
+    with pytest.raises(TrainingDiverged, match="no finite numbers at step 200"):
+        train_sac([songs], out, SMALL, 1)
+    assert not list(out.rglob("*.onnx"))
 
 
 @pytest.mark.parametrize("changes", [{}, {"buffer_size": 60}, {"algorithm": "tqc", "reach": 0.5}])

@@ -183,3 +183,8 @@ def test_one_song_is_too_few(data, tmp_path, two_notes):
     write_trajectories(alone, iter([Episode("one", 1.0, "ik", columns, 1)]))
     with pytest.raises(InputError, match="two songs"):
         train_stage("fingering", SHORT, tmp_path, [alone])
+
+
+def test_another_stage_is_refused_before_data_are_read(tmp_path):
+    with pytest.raises(InputError, match="stage must be one of fingering, hand-motion"):
+        train_stage("controls", StageConfig(), tmp_path, [tmp_path / "none"])

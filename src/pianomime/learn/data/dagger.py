@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import pickle
 import warnings
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from pianomime.keyboard import NO_KEY
 from pianomime.learn.data.dagger_config import DaggerConfig
 from pianomime.learn.data.episode import (
     Episode,
-    PhysicsError,
     Recording,
     base_controls,
     fill_columns,
@@ -42,19 +41,43 @@ from pianomime.policies.finger_assignment import flat_plan
 from pianomime.policies.fingertip_policy import PlanRecord
 from pianomime.policies.methods import load_policy_tracker
 from pianomime.policies.network_file import load_policy
-from pianomime.policies.policy_tracker import PolicyController
+from pianomime.policies.policy import Policy
+from pianomime.policies.policy_tracker import PolicyController, PolicyTracker
 from pianomime.policies.predicted_plan import predicted_plan
 from pianomime.policies.sampler import Sampler
 from pianomime.shown import shown
 from pianomime.staging import scratch
 from pianomime.track import DynamicTracker, IkTracker
-from pianomime.workers import Answer, Row, work
+from pianomime.workers import Answer, Row, cores, work
 from pianomime.world.device_batch import check_device, device_batch
 
 _WORKER = "pianomime.learn.data.dagger:load_dagger_worker"
 
 _FAST = Sampler(steps=2)
 """Sampling of the policies that play: there are many frames, and rough actions will do."""
+
+
+class _Policies(NamedTuple):
+    """The policies of a config, loaded once for all that is played side by side."""
+
+    fingertips: Policy | None
+    rollout: PolicyTracker | None
+
+    @classmethod
+    def of(cls, config: DaggerConfig) -> _Policies:
+        """Load them.
+
+        Raises:
+            InputError: one is not there, damaged, or of another level.
+        """
+        fingertips = rollout = None
+        if config.fingertip_policy is not None:
+            fingertips = load_policy(config.fingertip_policy, _FAST)
+            if fingertips.info.level != "high":
+                raise InputError(f"{config.fingertip_policy}: not a policy that outputs fingertips")
+        if config.rollout_policy is not None:
+            rollout = load_policy_tracker(config.rollout_policy, _FAST)
+        return cls(fingertips, rollout)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,17 +112,18 @@ def collect_dagger_episodes(
             the same bit for bit, whatever is played beside it.
 
     Returns:
-        Of each demonstration its episode, or why there is none: a policy cannot be read, or the
+        Of each demonstration its episode, or why there is none: it cannot be played, or the
         physics broke.
 
     Raises:
-        InputError: the config's device cannot be used here.
+        InputError: a policy cannot be read, or the config's device cannot be used here.
     """
+    policies = _Policies.of(config)
     made: list[Episode | InputError | None] = [None] * len(demonstrations)
     takes: dict[int, _Take] = {}
     for index, (demonstration, number) in enumerate(zip(demonstrations, numbers, strict=True)):
         try:
-            takes[index] = _take(demonstration, number, config)
+            takes[index] = _take(demonstration, number, config, policies)
         except InputError as error:
             made[index] = error
     if takes:
@@ -108,26 +132,27 @@ def collect_dagger_episodes(
         worlds = device_batch(len(takes), config.device, threads=1, quiet=True)
         recordings = record_together(controllers, scores, worlds)
         for index, recording in zip(takes, recordings, strict=True):
-            if isinstance(recording, PhysicsError):
+            if isinstance(recording, InputError):
                 made[index] = recording
             else:
                 made[index] = _episode(takes[index], recording)
     return [each for each in made if each is not None]
 
 
-def _take(demonstration: Demonstration, number: int, config: DaggerConfig) -> _Take:
+def _take(
+    demonstration: Demonstration, number: int, config: DaggerConfig, policies: _Policies
+) -> _Take:
     rng = np.random.default_rng([config.seed, number])
     spread = noise_spread(config.noise * rng.random())
     seeds = rng.integers(2**31, size=2).tolist()
     score, plan = demonstration.score, demonstration.plan
-    if config.fingertip_policy is not None:
-        plan = predicted_plan(score, load_policy(config.fingertip_policy, _FAST), seeds[1])
+    if policies.fingertips is not None:
+        plan = predicted_plan(score, policies.fingertips, seeds[1])
     feasible = make_feasible(plan)
     plan = flat_plan(feasible)
     played = None
-    if config.rollout_policy is not None:
-        tracker = load_policy_tracker(config.rollout_policy, _FAST, seeds[0])
-        played = PolicyController(plan, tracker, score.roll())
+    if policies.rollout is not None:
+        played = PolicyController(plan, policies.rollout.seeded(seeds[0]), score.roll())
     expert = DynamicTracker().start(feasible)
     controller = NoisyController(expert, played, spread, config.noise_correlation, rng)
     return _Take(demonstration, plan, controller)
@@ -168,17 +193,14 @@ def songs_without_plan(paths: Sequence[Path]) -> list[Demonstration]:
     return demonstrations
 
 
-def check_policies(config: DaggerConfig) -> None:
-    """Refuse policies that cannot play.
+def check_config(config: DaggerConfig) -> None:
+    """Refuse policies that cannot play, and a device that cannot be used.
 
     Raises:
-        InputError: one is not there, damaged, or of another level.
+        InputError: a policy is not there, damaged, or of another level; or see `check_device`.
     """
-    fingertips = config.fingertip_policy
-    if fingertips is not None and load_policy(fingertips).info.level != "high":
-        raise InputError(f"{fingertips}: not a policy that outputs fingertips")
-    if config.rollout_policy is not None:
-        load_policy_tracker(config.rollout_policy)
+    check_device(config.device)
+    _Policies.of(config)
 
 
 def collect_dagger(
@@ -199,14 +221,14 @@ def collect_dagger(
             demonstration and no policy says where fingers go.
         WorkFailed: no demonstration can be played, or the disk for temporary files is full.
     """
-    check_policies(config)
-    check_device(config.device)
+    check_config(config)
     if config.fingertip_policy is None:
         for demonstration in demonstrations:
             if (demonstration.plan.finger_key == NO_KEY).all():
                 title = demonstration.score.title
                 raise InputError(f"{title}: no finger presses a key; give a fingertip policy")
-    groups = _groups(len(demonstrations), config.worlds)
+    jobs = cores() if jobs is None else jobs
+    groups = _groups(len(demonstrations), config.worlds, jobs)
     # Episodes are large, and pass through files. Nobody else can write into this folder.
     with scratch() as folder:
 
@@ -219,11 +241,11 @@ def collect_dagger(
         # Whether each could be played.
         done: dict[int, bool] = {}
         turn = 0
-        with closing(work(_WORKER, groups, jobs, request=request)) as recorded:
+        with closing(_rows(groups, jobs, request)) as recorded:
             for group, row in recorded:
                 if "unwritable" in row:
                     raise WorkFailed(f"episodes cannot be kept: {row['unwritable']}")
-                reasons = row["errors"] if "errors" in row else [row["error"]] * len(group)
+                reasons = row["errors"] if "errors" in row else [row["error"]]
                 for number, reason in zip(group, reasons, strict=True):
                     done[number] = reason is None
                     if reason is not None:
@@ -241,9 +263,32 @@ def collect_dagger(
                     turn += 1
 
 
-def _groups(number: int, most: int) -> list[range]:
-    """Demonstrations that are played side by side, by their numbers in order."""
-    return [range(first, min(first + most, number)) for first in range(0, number, most)]
+def _groups(number: int, most: int, jobs: int) -> list[range]:
+    """Demonstrations that are played side by side, by their numbers in order.
+
+    Args:
+        number: of all demonstrations.
+        most: of those in a group.
+        jobs: processes, none of which shall be idle while others have several to play.
+    """
+    size = max(min(most, -(-number // max(jobs, 1))), 1)
+    return [range(first, min(first + size, number)) for first in range(0, number, size)]
+
+
+def _rows(
+    groups: list[range], jobs: int, request: Callable[[range], Any]
+) -> Generator[tuple[range, Row], None, None]:
+    """The rows of groups; one that fails as a whole is played again, one by one."""
+    again: list[range] = []
+    with closing(work(_WORKER, groups, jobs, request=request)) as recorded:
+        for group, row in recorded:
+            if "error" in row and len(group) > 1:
+                again += [range(number, number + 1) for number in group]
+            else:
+                yield group, row
+    if again:
+        with closing(work(_WORKER, again, jobs, request=request)) as recorded:
+            yield from recorded
 
 
 def _file(folder: Path, number: int) -> Path:

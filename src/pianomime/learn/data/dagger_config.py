@@ -14,7 +14,7 @@ from pianomime.validation import check_seed, one_of, whole_numbers, within
 
 @dataclass(frozen=True)
 class DaggerConfig:
-    """Which policies play, and how much noise is on their controls."""
+    """Which policies play, how much noise is on their controls, and what steps the worlds."""
 
     noise: float = 0.2
     """Largest standard deviation [rad] of the noise on the controls of fingers; each episode has a

@@ -223,7 +223,7 @@ def record(
 
 def record_together(
     controllers: Sequence[Controller], scores: Sequence[Score], worlds: WorldBatchBase
-) -> list[Recording | PhysicsError]:
+) -> list[Recording | InputError]:
     """Play songs side by side, each in a world of its own, and record what `record` does.
 
     Args:
@@ -233,26 +233,39 @@ def record_together(
         worlds: as many, at rest.
 
     Returns:
-        Of each song the recording, or that its physics broke.
+        Of each song the recording, or why there is none: its controller raised an `InputError`, or
+        the physics broke.
     """
     views = [OneOfBatch(worlds, index) for index in range(len(worlds))]
     pedals = [score.pedal_roll() for score in scores]
-    recorders = [_Recorder(len(pedal), view) for pedal, view in zip(pedals, views, strict=True)]
+    recorders = dict(enumerate(map(_Recorder, map(len, pedals), views)))
+    ended: dict[int, Recording | InputError] = {}
+    # All step, also those that have ended: on a GPU to step some takes longer than to step all.
+    ctrl = np.zeros((len(worlds), LAYOUT.ctrl_size))
+    down = np.zeros(len(worlds), bool)
     for frame in range(max(map(len, pedals))):
-        ids = [index for index, pedal in enumerate(pedals) if frame < len(pedal)]
-        # A view is no World, but has all that these controllers read.
-        ctrl = [controllers[each].control(frame, cast(World, views[each])) for each in ids]
-        pedal = [bool(pedals[each][frame]) for each in ids]
-        worlds.step(np.array(ctrl), pedal, ids)
-        for each, sent, down in zip(ids, ctrl, pedal, strict=True):
-            recorders[each].record(Step(frame, sent, down, views[each].key_events))
-    ended: list[Recording | PhysicsError] = []
-    for recorder in recorders:
-        try:
-            ended.append(recorder.recording(DEFAULT_TOUCH))
-        except PhysicsError as error:
-            ended.append(error)
-    return ended
+        for index in list(recorders):
+            try:
+                # A view is no World, but has all that these controllers read.
+                ctrl[index] = controllers[index].control(frame, cast(World, views[index]))
+            except InputError as error:
+                ended[index] = error
+                del recorders[index]
+            down[index] = pedals[index][frame]
+        worlds.step(ctrl, down)
+        for index, recorder in list(recorders.items()):
+            events = views[index].key_events
+            recorder.record(Step(frame, ctrl[index].copy(), bool(down[index]), events))
+            if frame + 1 == len(pedals[index]):
+                ended[index] = _recording_of(recorders.pop(index))
+    return [ended[index] for index in range(len(pedals))]
+
+
+def _recording_of(recorder: _Recorder) -> Recording | PhysicsError:
+    try:
+        return recorder.recording(DEFAULT_TOUCH)
+    except PhysicsError as error:
+        return error
 
 
 class _Recorder:

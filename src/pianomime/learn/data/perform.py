@@ -325,7 +325,8 @@ def _checked_player(player: str | Path, setup: dict[str, Any]) -> Player:
     if not setup["seconds"] > 0:
         raise InputError(f"seconds must be more than 0, not {setup['seconds']:g}")
     within("noise", setup["noise"], 0, 1)
-    check_seed("seed", setup["seed"])
+    # It is kept in JSON, as a whole number.
+    check_seed("seed", setup["seed"], bits=63)
     casting = Casting.of(
         player, setup["effort"], setup["seed"], setup["world"], **setup["settings"]
     )

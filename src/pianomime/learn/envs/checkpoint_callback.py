@@ -113,6 +113,7 @@ class ResumableCallback(BaseCallback):
             if "satisfy the constraint" not in str(error):
                 raise
             raise self._diverged() from error
+        self._check_finite()
 
     def between_updates(self) -> None:
         """Save, and seed the next update."""

@@ -129,7 +129,9 @@ class ExpertConfig:
         whole_numbers(self)
         one_of("method", self.method, ("ppo", "search"))
         within("total_steps", self.total_steps, 1)
-        check_seed("seed", self.seed)
+        if self.method == "ppo":
+            check_seed("seed", self.seed)
+        within("seed", self.seed, 0)
         if self.method == "search" and self.env.device != CPU:
             # Its steps have to be those of the world in which it plays, bit for bit.
             raise InputError(f"env.device {self.env.device} needs method ppo: a search is on {CPU}")

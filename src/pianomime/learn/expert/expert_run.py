@@ -100,20 +100,18 @@ class ExpertRun:
             "seconds": seconds,
             "digest": _digest(demonstration),
         }
-        other = False
         if is_run(path):
             run = RunFolder.load(path)
             there = run.config.get(_EXCERPT)
-            if isinstance(there, dict) and there.get("digest") != excerpt["digest"]:
-                other = True
-                if run.begun:
-                    raise InputError(
-                        f"{path}: holds a run on another song, or another part of it "
-                        f"({there.get('title')}); name another folder"
-                    )
+            if run.begun and isinstance(there, dict) and there.get("digest") != excerpt["digest"]:
+                raise InputError(
+                    f"{path}: holds a run on another song, or another part of it "
+                    f"({there.get('title')}); name another folder"
+                )
         content = {_EXCERPT: excerpt, **to_json(config)}
         with RunFolder.open(path, _KIND, content, _MAY_DIFFER) as folder:
-            if other or not (path / _DEMONSTRATION).exists():
+            # One that is there may be of another song, on which nothing was trained.
+            if not folder.begun or not (path / _DEMONSTRATION).exists():
                 demonstration.save(path / _DEMONSTRATION)
             yield cls(folder, demonstration, config, start, seconds)
 

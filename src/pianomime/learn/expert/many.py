@@ -95,12 +95,15 @@ def train_experts(
                 rows[name] = {"song": name, **row}
                 report()
         ordered = [rows[name] for name in songs]
-        failed = [row for row in ordered if "error" in row]
-        if len(failed) == len(ordered):
-            # The results of an earlier call, if any, stay.
-            raise WorkFailed(f"no expert was trained: {failed[0]['song']}: {failed[0]['error']}")
-        _write(out / "experts.json", json.dumps(ordered, indent=1) + "\n")
-        _write(out / "experts.md", experts_table(ordered))
+        none = all("error" in row for row in ordered)
+        # The results of an earlier call, if any, are better than none.
+        if not (none and (out / "experts.json").exists()):
+            _write(out / "experts.json", json.dumps(ordered, indent=1) + "\n")
+            _write(out / "experts.md", experts_table(ordered))
+        if none:
+            first = f"{ordered[0]['song']}: {ordered[0]['error']}"
+            more = f", and {len(ordered) - 1} more" if len(ordered) > 1 else ""
+            raise WorkFailed(f"no expert was trained: {first}{more}")
         draw_f1_chart(ordered, out / "experts.png")
         return ordered
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pianomime.validation import above_zero, check_seed, whole_numbers, within
 
-_LARGEST_BATCH = 1_000_000
+_LARGEST_BATCH = 65_536
 """Samples that no machine is short of memory for, and more than anybody wants."""
 
 
