@@ -20,6 +20,7 @@ from pianomime.plan import ZeroShotPlanner
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+REPLAYS = DOCS / "replays"
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
 # The others show what needs data or hours.
 RUN = [
@@ -93,6 +94,8 @@ def test_links_between_documents_lead_somewhere(document: Path) -> None:
         if target.startswith(("https://", "http://")):
             continue
         file = document if not target else document.parent / target
+        if file.is_relative_to(REPLAYS) and not REPLAYS.exists():
+            continue  # `./do docs` makes them.
         assert file.exists(), target
         if anchor:
             assert anchor in anchors(file), f"{target}#{anchor}"

@@ -54,7 +54,7 @@ def test_a_controller_that_works_the_pedal_does() -> None:
     assert [step.pedal for step in steps] == [False, True, False, True]
 
 
-def test_it_is_the_only_such_loop() -> None:
+def test_they_are_the_only_such_loops() -> None:
     """Nobody else asks for controls and steps a World by them, but to look ahead or prepare."""
     both = []
     for file in sorted(ROOM.rglob("*.py")):
@@ -70,6 +70,7 @@ def test_it_is_the_only_such_loop() -> None:
                 both.append((file.relative_to(ROOM).as_posix(), function.name))
     assert both == [
         ("players/rollout.py", "rollout"),
+        ("players/rollout.py", "rollout_together"),
         ("track/calibration.py", "_strikes"),
         ("track/nominal_tracking.py", "settle"),
         ("track/rehearsal.py", "_listen"),

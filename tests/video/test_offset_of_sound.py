@@ -13,7 +13,7 @@ from pianomime.music import Score
 from pianomime.video.film.light_record import LightRecord
 from pianomime.video.hands.tracks import HandTracks
 from pianomime.video.notes.agreement import agreement
-from pianomime.video.notes.offset import LATE_SOUND, LATEST_SOUND, Offset, estimate_offset
+from pianomime.video.notes.offset import LATE_SOUND, LATEST_SOUND, Offset, _middle, estimate_offset
 from pianomime.video.remarks import on_sound
 
 SECONDS = 16.0
@@ -86,3 +86,18 @@ def test_notes_during_titles_prove_nothing(score: Score, tracks: HandTracks) -> 
     agreed = agreement(score, away, missing)
     assert agreed.share > 0.9
     assert agreed.beyond_chance > 0.5
+
+
+@pytest.mark.parametrize("best", [3, 4, 5, 6])
+def test_of_lags_that_fit_alike_the_middle_is_taken(best: int) -> None:
+    """As where fingers rest on their keys before and after; the best by a hair is chance."""
+    fit = np.array([0.1, 0.2, 0.7, 1.0, 1.0, 1.0, 1.0, 0.8, 0.1])
+    fit[best] += 0.008
+    assert _middle(fit, best, 0.02) == pytest.approx(4.5)
+    # What differs by more is told apart, to less than a frame.
+    assert _middle(fit, best, 0.0) == pytest.approx(best, abs=0.51)
+
+
+def test_a_plateau_may_reach_the_end() -> None:
+    assert _middle(np.ones(5), 2, 0.0) == pytest.approx(2.0)
+    assert _middle(np.array([1.0, 1.0, 0.0]), 0, 0.1) == pytest.approx(0.5)

@@ -149,7 +149,7 @@ def test_what_is_missing_is_named(data, tmp_path):
     with pytest.raises(InputError, match="two songs"):
         train_policy("high-diff-no-sdf", NO_SDF, tmp_path, tmp_path / "alone", [], None)
     (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match="nothing to train on"):
+    with pytest.raises(InputError, match="no demonstrations in this folder"):
         train_policy("high-diff-no-sdf", NO_SDF, tmp_path, tmp_path / "empty", [], None)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pianomime.errors import InputError
 from pianomime.keyboard import FRAME_SECONDS, KEYS
 from pianomime.music import Score, frame_metrics
-from pianomime.players.rollout import Step, rollout
+from pianomime.players.rollout import Step, rollout, rollout_together
 from pianomime.short_repr import short_repr
 from pianomime.track import BatchController, Controller
 from pianomime.world import World
@@ -236,28 +236,19 @@ def record_together(
         Of each song the recording, or why there is none: its controller raised an `InputError`, or
         the physics broke.
     """
-    views = [OneOfBatch(worlds, index) for index in range(len(worlds))]
     pedals = [score.pedal_roll() for score in scores]
-    recorders = dict(enumerate(map(_Recorder, map(len, pedals), views)))
+    recorders = [
+        _Recorder(len(pedal), OneOfBatch(worlds, index)) for index, pedal in enumerate(pedals)
+    ]
     ended: dict[int, Recording | InputError] = {}
-    # All step, also those that have ended: on a GPU to step some takes longer than to step all.
-    ctrl = np.zeros((len(worlds), LAYOUT.ctrl_size))
-    down = np.zeros(len(worlds), bool)
-    for frame in range(max(map(len, pedals))):
-        for index in list(recorders):
-            try:
-                # A view is no World, but has all that these controllers read.
-                ctrl[index] = controllers[index].control(frame, cast(World, views[index]))
-            except InputError as error:
-                ended[index] = error
-                del recorders[index]
-            down[index] = pedals[index][frame]
-        worlds.step(ctrl, down)
-        for index, recorder in list(recorders.items()):
-            events = views[index].key_events
-            recorder.record(Step(frame, ctrl[index].copy(), bool(down[index]), events))
-            if frame + 1 == len(pedals[index]):
-                ended[index] = _recording_of(recorders.pop(index))
+    for steps in rollout_together(controllers, worlds, pedals):
+        for index, step in steps.items():
+            if isinstance(step, InputError):
+                ended[index] = step
+                continue
+            recorders[index].record(step)
+            if step.frame + 1 == len(pedals[index]):
+                ended[index] = _recording_of(recorders[index])
     return [ended[index] for index in range(len(pedals))]
 
 

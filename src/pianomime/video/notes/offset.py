@@ -24,6 +24,8 @@ LATE_SOUND, LATEST_SOUND = 0.5, 3.0
 _UNUSUAL = 0.8
 """Weight of the evidence for an unusual offset: music is much like itself some beats later."""
 
+_TIE = 0.5
+"""Notes by which the evidence for two offsets may differ by chance."""
 _INSIDE = 0.5
 """Least overlap of music and video, as a share of the shorter one."""
 
@@ -97,7 +99,7 @@ def estimate_offset(
     # Where the music is hardly in the video, no offset is better than none.
     at = int(np.argmax(np.where(open_lags, sure, -np.inf)) if open_lags.any() else -lags[0])
     if given is None:
-        seconds = (lags[at] + _vertex(total, at)) / FRAME_RATE
+        seconds = (lags[0] + _middle(total, at, _TIE / counts[at])) / FRAME_RATE
     else:
         seconds = given
         at = int(np.clip(round(given * FRAME_RATE) - lags[0], 0, len(lags) - 1))
@@ -131,6 +133,24 @@ def _at_onsets(
             train = np.bincount(struck, minlength=onset.max() + 1).astype(np.float64)
             total += fftconvolve(value(each).astype(np.float64), train[::-1])
     return total
+
+
+def _middle(value: NDArray[np.float64], at: int, tie: float) -> float:
+    """The place of a maximum: between samples, or in the middle of those that are as good.
+
+    Where fingers rest on their keys long before and after they strike, many lags fit alike, and
+    which is the best by a hair is chance.
+
+    Args:
+        value: (L,) samples.
+        at: of the greatest.
+        tie: how much less is as good.
+    """
+    as_good = value >= value[at] - tie
+    before, after = as_good[:at][::-1], as_good[at + 1 :]
+    first = at - int(np.argmin(np.append(before, False)))
+    last = at + int(np.argmin(np.append(after, False)))
+    return at + _vertex(value, at) if first == last else (first + last) / 2
 
 
 def _vertex(value: NDArray[np.float64], at: int) -> float:
