@@ -94,12 +94,15 @@ def estimate_offset(
     total = evidence + best_light
     # Music repeats itself, so a good fit of many notes is better evidence than one of few.
     sure = (total - np.median(total[possible])) * np.sqrt(counts)
-    sure *= np.where(np.abs(lags) <= usual * FRAME_RATE, 1.0, _UNUSUAL)
+    is_usual = np.abs(lags) <= usual * FRAME_RATE
+    sure *= np.where(is_usual, 1.0, _UNUSUAL)
     open_lags = possible & (np.abs(lags) <= most * FRAME_RATE)
     # Where the music is hardly in the video, no offset is better than none.
     at = int(np.argmax(np.where(open_lags, sure, -np.inf)) if open_lags.any() else -lags[0])
     if given is None:
-        seconds = (lags[0] + _middle(total, at, _TIE / counts[at])) / FRAME_RATE
+        as_good = open_lags & (is_usual == is_usual[at])
+        as_good &= total >= total[at] - _TIE / max(counts[at], 1.0)
+        seconds = (lags[0] + _middle(total, at, as_good)) / FRAME_RATE
     else:
         seconds = given
         at = int(np.clip(round(given * FRAME_RATE) - lags[0], 0, len(lags) - 1))
@@ -135,7 +138,7 @@ def _at_onsets(
     return total
 
 
-def _middle(value: NDArray[np.float64], at: int, tie: float) -> float:
+def _middle(value: NDArray[np.float64], at: int, as_good: NDArray[np.bool_]) -> float:
     """The place of a maximum: between samples, or in the middle of those that are as good.
 
     Where fingers rest on their keys long before and after they strike, many lags fit alike, and
@@ -144,9 +147,8 @@ def _middle(value: NDArray[np.float64], at: int, tie: float) -> float:
     Args:
         value: (L,) samples.
         at: of the greatest.
-        tie: how much less is as good.
+        as_good: (L,) which are as good as that.
     """
-    as_good = value >= value[at] - tie
     before, after = as_good[:at][::-1], as_good[at + 1 :]
     first = at - int(np.argmin(np.append(before, False)))
     last = at + int(np.argmin(np.append(after, False)))
