@@ -56,6 +56,18 @@ def made(songs: Path | list[Path], out: Path, **given: Any) -> factory.Performed
     return perform(paths, out, **{"seconds": SECONDS, "jobs": 1, **given})
 
 
+def play_alone(songs: Path, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Play all songs, and end before they are put together, as on a disk that is full by then."""
+
+    def full(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(factory, "write_trajectories", full)
+        with pytest.raises(WorkFailed):
+            made(songs, out)
+
+
 def digests(out: Path) -> dict[str, dict[str, str]]:
     """Of every column of every episode, by name of the song."""
     data = TrajectoryData.open(out)
@@ -444,14 +456,7 @@ def test_a_damaged_part_of_a_song_that_is_not_named_is_left_out(
     songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "songs.zarr"
-
-    def full(*_: object) -> int:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(factory, "write_trajectories", full)
-        with pytest.raises(WorkFailed):
-            made(songs, out)
+    play_alone(songs, out, monkeypatch)
     one, _ = parts_in(parts_folder(out))
     one.write_bytes(one.read_bytes()[:-100])
     with pytest.warns(UserWarning, match="left out and removed: its song has"):
@@ -465,14 +470,7 @@ def test_a_song_that_was_renamed_meanwhile_is_in_it_once(
     songs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = tmp_path / "songs.zarr"
-
-    def killed(*_: object) -> int:
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(factory, "write_trajectories", killed)
-        with pytest.raises(WorkFailed):
-            made(songs, out)
+    play_alone(songs, out, monkeypatch)
     (songs / "one.mid").rename(songs / "first.mid")
     result = made(songs, out)
     assert (result.added, result.episodes) == (2, 2)

@@ -78,12 +78,7 @@ def train_experts(
 
         report()
         if ray is None:
-            trained = work(
-                EXPERT_WORKER,
-                requests,
-                jobs,
-                request=requests.__getitem__,
-            )
+            trained = work(EXPERT_WORKER, requests, jobs, request=requests.__getitem__)
         else:
             from pianomime.ray_cluster import on_cluster
 
